@@ -5,7 +5,6 @@
 // (3) the range that the device declares for the space, if it extends beyond -1..1, with the user's
 // angles at its ends, or as degrees if it can be nothing else; (4) -1..1 with the user's angles at
 // its ends, as in the standard. A position outside its scale is an error. No side effects.
-// standard has it. A position beyond its scale is none. Pure.
 
 #include <optional>
 #include <string>

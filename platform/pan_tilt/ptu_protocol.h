@@ -6,7 +6,6 @@
 // unless the degrees per step are configured, then PP and TP in turn. A verbose answer names its
 // axis, which must be the one asked; a terse one does not, nor does an answer to PR and TR. Fences
 // (query_protocol.h): docs/derivations.md. A lost digit is not noticed.
-// resolutions and what follows them. A digit lost on the way is not noticed.
 
 #include <optional>
 
