@@ -54,8 +54,8 @@ class QueryProtocol {
   virtual ~QueryProtocol() = default;
 
   [[nodiscard]] virtual const char* name() const = 0;
-  virtual void
-  restart() = 0;  // a new connection, before its first query: nothing is known of the device
+  // On a new connection, before its first query: nothing is known of the device.
+  virtual void restart() = 0;
   // Never empty: an answer is awaited after each query. After give_up() its bytes differ from those
   // before.
   [[nodiscard]] virtual Query next() = 0;

@@ -28,12 +28,10 @@ struct FrameStamp {
   // s, host CLOCK_MONOTONIC; arrival of the frame's last packet. A source that stamps its first
   // byte or takes the driver's stamp says so.
   double receive_time_s = 0;
-  std::optional<double> sender_time_s;   // capture time on the sender's clock, unwrapped, any
-                                         // epoch
+  std::optional<double> sender_time_s;   // capture, by the sender's clock; unwrapped, any epoch
   std::optional<double> sender_utc_s;    // the same as Unix time, once RTCP or the like gives it
   std::optional<std::int64_t> sequence;  // the sender's frame count, unwrapped; a gap is a loss
-  bool restarted =
-      false;  // first frame after a (re)connection: sender clock and sequence start anew
+  bool restarted = false;  // first after a (re)connection: sender clock and sequence start anew
   StampedAt stamped_at = StampedAt::kArrival;
 };
 

@@ -30,8 +30,8 @@ namespace {
 constexpr long kReceiveBuffer = 128 * 1024;  // bytes read at a time
 // Limits the sleep for the awaited bytes, in case fewer come than announced.
 constexpr double kMostAsleep_s = 0.02;
-constexpr int kUselessInARow =
-    1000;  // parts that are not pictures; one or two before each picture are usual
+// Parts that are not pictures; one or two before each picture are usual.
+constexpr int kUselessInARow = 1000;
 // A sender that woke the thread this often for one picture sends byte by byte. From then on it is
 // woken at most once per pause.
 constexpr int kWakesForAPicture = 256;

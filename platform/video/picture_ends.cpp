@@ -45,9 +45,7 @@ PictureEnds::Picture* PictureEnds::find(std::uint32_t timestamp) {
 
 PictureEnds::Picture* PictureEnds::find_piece(std::int64_t pts) {
   const auto ticks = static_cast<std::uint32_t>(static_cast<std::uint64_t>(pts));
-  if (!zero_)
-    zero_ = pictures_[latest_].timestamp - ticks;  // nothing is waiting in libavformat
-                                                   // yet
+  if (!zero_) zero_ = pictures_[latest_].timestamp - ticks;  // nothing waits in libavformat yet
   return find(ticks + *zero_);
 }
 

@@ -25,9 +25,7 @@ std::uint32_t big_endian(const std::uint8_t* bytes, std::size_t count) {
 }
 
 std::optional<double> unix_time(std::uint32_t ntp_seconds, std::uint32_t ntp_fraction) {
-  if (ntp_seconds == 0 && ntp_fraction == 0)
-    return std::nullopt;  // the sender does not know the
-                          // time
+  if (ntp_seconds == 0 && ntp_fraction == 0) return std::nullopt;  // unknown to the sender
   const double era_s = ntp_seconds < kSecondHalf ? kNtpEra : 0;
   return era_s + ntp_seconds - kUnixInNtp + ntp_fraction / kNtpEra;
 }

@@ -105,8 +105,8 @@ class RtpSource : public FrameSource {
   Remarks remarks_;
 
   // Since when pictures have come that need a key frame before them (CLOCK_MONOTONIC); < 0: none is
-  // awaited. First: at the start of a connection, or where a slow reader left pictures. Second:
-  // after a loss.
+  // awaited. First: at the start of a connection, or after pictures were dropped for a slow
+  // reader. Second: after a loss.
   std::atomic<double> no_first_key_since_s_{-1};
   std::atomic<double> no_key_after_loss_since_s_{-1};
 

@@ -21,8 +21,8 @@ namespace alidade {
 // A received RTP or RTCP packet.
 struct ReceivedPacket {
   std::size_t size = 0;  // bytes
-  double arrival_s =
-      0;  // CLOCK_MONOTONIC; the kernel's time if it gives one, else when the packet was read
+  // CLOCK_MONOTONIC; the kernel's time if it gives one, else when the packet was read.
+  double arrival_s = 0;
 };
 
 class RtpTransport {
