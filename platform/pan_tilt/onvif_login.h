@@ -21,8 +21,8 @@ class OnvifLoginWays {
   enum class Way { kDeviceClock, kHostClock, kLocalClock, kDigest };
   static constexpr int kMostTries = 3;
 
-  // told: the clock that the device reports; nullopt: none. Both times are those of the answer, in
-  // s.
+  // told: the clock that the device reports; nullopt: none. Both times (s) are those of the
+  // answer.
   void set_clock(const std::optional<OnvifClock>& told, double monotonic_s, double utc_s);
 
   [[nodiscard]] Way way() const { return way_; }

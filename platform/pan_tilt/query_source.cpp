@@ -9,10 +9,10 @@
 namespace alidade {
 namespace {
 
-constexpr double kQuietBytes = 10;  // times of a byte without one are silence
+constexpr double kQuietBytes = 10;  // byte times without a byte count as silence
 constexpr double kLeastQuiet_s = 0.02;
 constexpr int kTriesPerTimeout = 4;
-constexpr double kWireTimes = 2;  // of query and answer, for a head that answers
+constexpr double kWireTimes = 2;  // times of query and answer on the wire, for an answer
 constexpr double kLeastAnswer_s = 0.05;
 constexpr double kLeastLatest_s = 1;
 constexpr int kGivenUpOfALostHead = 3;

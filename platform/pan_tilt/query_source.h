@@ -91,7 +91,7 @@ class QuerySource : public PanTiltSource {
   int open_ = 0;                // consecutive unanswered queries; their answers may still come
   double open_since_s_ = 0;     // when the first of these was sent
   bool refused_ = false;        // the latest query was refused by an answer
-  bool fenced_ = false;         // the protocol was told of a doubt; its next query is a fence
+  bool fenced_ = false;         // protocol_->doubt() was called; its next query is a fence
   bool first_is_old_ = false;   // the next answer may belong to a query of the previous connection
   bool late_awaited_ = false;   // the latest query was given up, and its answer may still come
   double late_s_ = 0;           // delay of an answer that came after its query was given up; 0:

@@ -327,7 +327,7 @@ std::string set_lowest_priority() {
   if (error == 0) return "";
   constexpr int kNicest = 19;
   if (pthread_setschedparam(pthread_self(), SCHED_OTHER, &none) == 0 &&
-      setpriority(PRIO_PROCESS, 0, kNicest) == 0) {  // of this thread alone, on Linux
+      setpriority(PRIO_PROCESS, 0, kNicest) == 0) {  // for this thread only, on Linux
     return "";
   }
   return std::string("cannot run at the lowest priority (") + std::strerror(error) + ")";

@@ -42,7 +42,7 @@ class Watchdog {
   std::condition_variable over_soon_;
   bool over_ = false;
   bool barked_ = false;
-  std::thread thread_;  // last: it uses the others
+  std::thread thread_;  // last, as it uses the other members
 };
 
 }  // namespace alidade

@@ -19,7 +19,7 @@ namespace alidade {
 namespace {
 
 constexpr const char* kUnfinished = ".unfinished-";
-constexpr const char* kRandom = "XXXXXX";  // what mkostemp puts letters and digits for
+constexpr const char* kRandom = "XXXXXX";  // replaced by mkostemp with letters and digits
 
 // A file beside the target: renamed onto it once it is synced to the disk, else removed.
 class TemporaryFile {
@@ -37,7 +37,7 @@ class TemporaryFile {
     if (!renamed_) ::unlink(name_.c_str());
   }
 
-  // False leaves the reason in errno.
+  // On false the reason is in errno.
   bool replace(const std::string& target, const std::string& content) {
     if (descriptor_ < 0 || !write_all(descriptor_, content)) return false;
     // mkostemp lets only the owner read the file; what is stored here is no secret.
@@ -145,7 +145,7 @@ FileDescriptor open_to_read(const std::string& path, std::string* error) {
   };
   // A plain open would wait for a pipe's writer, and would take a terminal as the controlling one.
   FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY));
-  // A socket cannot be opened.
+  // open() gives ENXIO for a socket.
   if (!file.is_open() && errno == ENXIO) return refuse("not a file, but a socket or a device");
   if (!file.is_open()) return refuse(std::strerror(errno));
   struct stat status = {};

@@ -86,8 +86,8 @@ bool set(const FileDescriptor& socket, int level, int name, const Value& value) 
   return ::setsockopt(socket.get(), level, name, &value, sizeof value) == 0;
 }
 
-// If the senders are known, the network is told, too (RFC 4607): some networks forward a group's
-// packets only then.
+// If the senders are known, joins for them only (RFC 4607): some networks forward a group's packets
+// only then.
 bool join(const FileDescriptor& socket, const SocketAddress& group, const UdpSenders& senders) {
   const int level = group.storage.ss_family == AF_INET6 ? IPPROTO_IPV6 : IPPROTO_IP;
   for (const std::string& sender : senders.names()) {
