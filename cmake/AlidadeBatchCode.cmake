@@ -1,5 +1,6 @@
-# Code that is never on a record's way lies together in the executable, so that locked memory can do without it; a linker that takes
-# no such scripts leaves it where it is. Another linker needs another build folder, as the answer is kept.
+# Gathers code that is never on a record's way in one part of the executable, so that it need not be
+# in locked memory. A linker that accepts no such scripts leaves it where it is. Use another build
+# folder for another linker, as the result of the check is cached.
 function(alidade_gather_batch_code name)
   include(CheckLinkerFlag)
   set(script ${PROJECT_SOURCE_DIR}/cmake/batch_code.ld)

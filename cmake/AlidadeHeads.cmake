@@ -1,6 +1,6 @@
-# What there is for each head on a line follows from the rows of kHeads in platform/pan_tilt/heads.h: ALIDADE_HEADS is the
-# list of their keys. A file that a head lacks, and one of a head without a row, is an error of CMake, not something that
-# nobody builds.
+# Files per head on a line, from the rows of kHeads in platform/pan_tilt/heads.h. ALIDADE_HEADS is
+# the list of their keys. A missing file of a head, or a file without a row, is an error of CMake,
+# so that none is left unbuilt.
 include_guard(GLOBAL)
 
 set(heads ${PROJECT_SOURCE_DIR}/platform/pan_tilt/heads.h)
@@ -19,8 +19,8 @@ foreach(row IN LISTS rows)
 endforeach()
 
 # alidade_files_of_heads(sources pan_tilt/ _protocol.cpp)
-# sets the variable to pan_tilt/KEY_protocol.cpp of each head; the prefix is a folder below the current one, or "". No
-# other file there ends like that.
+# sets the variable to pan_tilt/KEY_protocol.cpp of each head. The prefix is a folder below the
+# current one, or "". No other file there may end like that.
 function(alidade_files_of_heads out prefix suffix)
   set(files)
   foreach(key IN LISTS ALIDADE_HEADS)

@@ -1,5 +1,6 @@
-# Debian packages, by `cpack` in the build folder (scripts/package does all of it): alidade, the executable as a
-# service; alidade-dev, headers, libraries and the CMake package. Included last: it packs what was installed so far.
+# Debian packages, by `cpack` in the build folder (scripts/package does everything): alidade, the
+# executable as a service; alidade-dev, headers, libraries and the CMake package. Must be included
+# last: it packs what was installed so far.
 set(packaging ${PROJECT_SOURCE_DIR}/edge_app/packaging)
 set(packages_dir ${PROJECT_BINARY_DIR}/packaging)
 
@@ -18,14 +19,15 @@ if(NOT newest MATCHES "^alidade \\(${PROJECT_VERSION}\\) ")
   message(FATAL_ERROR "${packaging}/changelog begins with '${newest}', and the version is ${PROJECT_VERSION}: add it there")
 endif()
 
-# Compressed as Debian wants them, and the same in each build.
+# Compressed as Debian requires, and identical in each build.
 file(MAKE_DIRECTORY ${packages_dir})
 foreach(file alidade.1 changelog)
   execute_process(COMMAND gzip -9nc ${packaging}/${file} OUTPUT_FILE ${packages_dir}/${file}.gz
     COMMAND_ERROR_IS_FATAL ANY)
 endforeach()
 
-# alidade_unit(NAME alidade@NAME ...): one camera, or one of several, whose configuration and state bear its name.
+# alidade_unit(FILE NAME ...): the unit of one camera, or the template for several, with
+# configuration and state by the instance's name.
 function(alidade_unit file)
   cmake_parse_arguments(A "" "NAME;DESCRIPTION;CONFIGURATION;STATE;OWN_ENVIRONMENT" "" ${ARGN})
   foreach(word NAME DESCRIPTION CONFIGURATION STATE OWN_ENVIRONMENT)
@@ -38,12 +40,12 @@ alidade_unit(alidade@.service NAME alidade@NAME DESCRIPTION ": %i" CONFIGURATION
   OWN_ENVIRONMENT "EnvironmentFile=-/etc/alidade/%i.environment\n")
 
 install(FILES ${packages_dir}/alidade.1.gz DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT runtime)
-# Found there by its name: the program's.
+# bash finds it there by the program's name.
 install(FILES ${packaging}/alidade.bash-completion DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions
   RENAME alidade COMPONENT runtime)
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/edge_app/examples/ DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/alidade/examples
   COMPONENT runtime FILES_MATCHING PATTERN "*.yaml" PATTERN "*.conf")
-# What only a package may lay down: `cmake --install` leaves the system's own folders alone.
+# Only for packages: `cmake --install` does not write to the system's own folders.
 install(FILES ${PROJECT_SOURCE_DIR}/edge_app/examples/service.yaml DESTINATION /etc/alidade RENAME alidade.yaml
   COMPONENT system EXCLUDE_FROM_ALL)
 install(FILES ${packages_dir}/alidade.service ${packages_dir}/alidade@.service DESTINATION /lib/systemd/system
@@ -54,7 +56,7 @@ install(FILES ${packaging}/copyright ${packages_dir}/changelog.gz DESTINATION /u
 install(FILES ${packaging}/copyright ${packages_dir}/changelog.gz DESTINATION /usr/share/doc/alidade-dev
   COMPONENT dev-system EXCLUDE_FROM_ALL)
 
-# All that is packed; `all` has the tests, too.
+# Everything that is packed; `all` would also build the tests.
 get_property(libraries GLOBAL PROPERTY ALIDADE_LIBRARIES)
 add_custom_target(packaged DEPENDS alidade)
 foreach(library IN LISTS libraries)
@@ -64,11 +66,11 @@ foreach(library IN LISTS libraries)
   endif()
 endforeach()
 
-# dpkg-shlibdeps asks dpkg's database of the machine, or of the sysroot.
+# dpkg-shlibdeps reads dpkg's database of the machine or of the sysroot.
 set(ALIDADE_EXECUTABLE ${PROJECT_BINARY_DIR}/edge_app/alidade)
 configure_file(${PROJECT_SOURCE_DIR}/cmake/AlidadePackagesConfig.cmake.in ${packages_dir}/config.cmake @ONLY)
 
-# cpack packs what has been built: `cmake --build . --target packaged`.
+# cpack only packs what has been built: `cmake --build . --target packaged`.
 set(CMAKE_SKIP_INSTALL_ALL_DEPENDENCY ON)
 set(CPACK_GENERATOR DEB)
 set(CPACK_PROJECT_CONFIG_FILE ${packages_dir}/config.cmake)
@@ -103,7 +105,7 @@ This is the program, and a systemd service that runs it. On armhf it needs a
 processor with NEON.")
 set(CPACK_DEBIAN_LIBRARIES_PACKAGE_NAME alidade-dev)
 set(CPACK_DEBIAN_LIBRARIES_PACKAGE_SECTION libdevel)
-# What the CMake package finds, and what its static libraries link.
+# What the CMake package finds and its static libraries link.
 set(CPACK_DEBIAN_LIBRARIES_PACKAGE_DEPENDS
   "libavcodec-dev, libavformat-dev, libavutil-dev, libboost-dev, libcurl4-openssl-dev, libeigen3-dev, libfmt-dev, libgstreamer-plugins-base1.0-dev, libpugixml-dev, libspdlog-dev, libssl-dev, libswscale-dev, libsystemd-dev, libturbojpeg0-dev, libyaml-cpp-dev")
 set(CPACK_COMPONENT_LIBRARIES_DESCRIPTION

@@ -1,4 +1,4 @@
-# The one way to declare a library, a program, a test and a benchmark: every target gets the same
+# The only way to declare a library, a program, a test and a benchmark. Every target gets the same
 # standard, warnings and sanitizers, and a test cannot be built without being registered.
 include_guard(GLOBAL)
 
@@ -10,23 +10,26 @@ set(CMAKE_POSITION_INDEPENDENT_CODE ON)
 add_library(alidade_options INTERFACE)
 target_compile_features(alidade_options INTERFACE cxx_std_17)
 target_compile_options(alidade_options INTERFACE
-  # In a unit of several sources a local may have the name of something in another: `dev` and `fuzz` look.
+  # Off in units of several sources, where a local may have the name of something in another source.
+  # The presets `dev` and `fuzz` check it.
   $<$<NOT:$<BOOL:$<TARGET_PROPERTY:UNITY_BUILD>>>:-Wshadow>
   -Wall -Wextra -Wpedantic -Wconversion -Wnon-virtual-dtor -Wold-style-cast
   -Woverloaded-virtual -Wnull-dereference -Werror)
-# 32-bit ARM. The macro as for those who use core/model: a prelude is taken only where the same macros are defined. In Eigen's scalar loops
-# GCC 12 takes the memory of a vector that may be empty for read.
+# 32-bit ARM. The macro is the one that core/model gives its users: GCC takes a prelude only where the
+# same macros are defined. The warning is a false one: in Eigen's scalar loops GCC 12 takes the memory of
+# a vector that may be empty for read.
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "^armv[67]")
   target_compile_definitions(alidade_options INTERFACE EIGEN_DONT_VECTORIZE)
   target_compile_options(alidade_options INTERFACE -Wno-null-dereference)
 endif()
-# GCC's collection of garbage is a tenth of its time; without it a source takes 2 GB at most. For libraries: tests are clang's.
+# GCC's garbage collection takes a tenth of its time; without it a source takes 2 GB at most. For
+# libraries only: tests are compiled by clang.
 cmake_host_system_information(RESULT host_memory_mb QUERY TOTAL_PHYSICAL_MEMORY)
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND host_memory_mb GREATER 8000)
   set(ALIDADE_COMPILER_MEMORY "SHELL:--param ggc-min-heapsize=1500000")
 endif()
-# The presets with sanitizers take clang: it compiles Eigen's expressions in half of GCC's time, and GCC 12 reports slips inside inlined
-# library code when it also instruments.
+# The presets with sanitizers use clang. It compiles Eigen's expressions in half of GCC's time, and
+# GCC 12 warns inside inlined library code when it also instruments.
 if(ALIDADE_SANITIZE)
   target_compile_options(alidade_options INTERFACE
     -fsanitize=${ALIDADE_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all
@@ -34,13 +37,14 @@ if(ALIDADE_SANITIZE)
   target_link_options(alidade_options INTERFACE -fsanitize=${ALIDADE_SANITIZE})
 endif()
 if(ALIDADE_FUZZ)
-  # Every library tells libFuzzer which ways its code took.
+  # Makes every library report its code coverage to libFuzzer.
   target_compile_options(alidade_options INTERFACE -fsanitize=fuzzer-no-link)
 endif()
 
-# What makes a slip in memory hard to use for an attack, in all that is shipped: canaries on the stack, checked calls of the C library,
-# no jump over the stack's guard page, and calls and jumps that land only where the compiler meant them to. For builds that optimise:
-# _FORTIFY_SOURCE does nothing in others. The sanitizers see more without it.
+# Hardening of all that is shipped, so that a memory error is hard to exploit: stack canaries,
+# checked calls of the C library, no jump over the stack's guard page, and calls and jumps only to
+# intended places. For optimising builds, as _FORTIFY_SOURCE does nothing in others. Sanitizers find
+# more without it.
 add_library(alidade_hardening INTERFACE)
 if(ALIDADE_HARDEN)
   if(ALIDADE_SANITIZE OR ALIDADE_FUZZ)
@@ -56,8 +60,9 @@ if(ALIDADE_HARDEN)
 endif()
 
 # alidade_harden(target)
-# compiles a library's own sources so, and links a program, whose symbols are then resolved at its start: never on the real-time thread,
-# and their table is read-only from then on. Not for tests: they are not shipped.
+# compiles a library's own sources with hardening. Links a program such that its symbols are
+# resolved at its start, never on the real-time thread, and their table is read-only afterwards. Not
+# for tests, which are not shipped.
 function(alidade_harden target)
   get_target_property(type ${target} TYPE)
   target_link_libraries(${target} PRIVATE $<BUILD_INTERFACE:alidade_hardening>)
@@ -67,9 +72,10 @@ function(alidade_harden target)
 endfunction()
 
 # alidade_leave_unchecked(target)
-# for the rooms of mathematics and the tests: each of Eigen's accesses would carry these checks, half of what such a source costs. The address
-# sanitizer and Eigen's own assertions find what they are for; the preset `fuzz` has them. A property: an option of the target itself would
-# stand before the one that asks for them.
+# leaves out some checks, for the rooms of mathematics and the tests. Each access of Eigen would
+# carry these checks, half of the cost of such a source. The address sanitizer and Eigen's own
+# assertions find the same errors, and the preset `fuzz` has the checks. This is a property because
+# an option of the target itself would come before the one that enables the checks.
 function(alidade_leave_unchecked target)
   if(ALIDADE_SANITIZE MATCHES undefined AND NOT ALIDADE_FUZZ)
     set_target_properties(${target} PROPERTIES ALIDADE_UNCHECKED null,alignment,object-size,vptr,pointer-overflow)
@@ -77,8 +83,9 @@ function(alidade_leave_unchecked target)
 endfunction()
 
 # alidade_leave_uninstrumented(target)
-# for a tool of the tests: sanitizers are for what is shipped, and the films would take most of their suites' time. The thread sanitizer must
-# see what all threads do.
+# leaves out the sanitizers, for a tool of the tests. Sanitizers are for what is shipped, and the
+# films would take most of their suites' time. Not in the thread-sanitized build: the thread
+# sanitizer must see all threads.
 function(alidade_leave_uninstrumented target)
   if(ALIDADE_SANITIZE MATCHES address)
     set_target_properties(${target} PROPERTIES ALIDADE_UNCHECKED all)
@@ -87,8 +94,9 @@ function(alidade_leave_uninstrumented target)
 endfunction()
 
 # alidade_prelude(edge_app HEADERS <Eigen/Dense> ... LINK ... OPTIONS ...)
-# compiles once what most sources of the libraries with `PRELUDE edge_app` include; OPTIONS are those of the libraries. Each
-# source includes what it needs nevertheless: the build for fuzzing has neither preludes nor sources compiled as one, and shows it.
+# precompiles headers that most sources of the libraries with `PRELUDE edge_app` include. OPTIONS
+# are those of the libraries. Each source must still include what it needs: the build for fuzzing
+# has neither preludes nor units of several sources, and fails otherwise.
 function(alidade_prelude name)
   cmake_parse_arguments(A "" "" "HEADERS;LINK;OPTIONS" ${ARGN})
   if(ALIDADE_FUZZ)
@@ -103,18 +111,20 @@ function(alidade_prelude name)
 endfunction()
 
 # alidade_unity(target)
-# compiles up to eight sources of the target as one, which halves what most rooms cost: half of that is what their sources include.
-# Names in anonymous namespaces must then differ within a room. The presets `dev` and `fuzz` compile each source by itself.
+# compiles up to eight sources of the target as one. That halves the cost of most rooms, as half of
+# it is for what their sources include. Names in anonymous namespaces must then differ within a
+# room. The presets `dev` and `fuzz` compile each source separately.
 function(alidade_unity target)
   if(ALIDADE_UNITY)
     set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 8)
   endif()
 endfunction()
 
-# alidade_library(model [INTERNAL] [UNITY] [PRELUDE name] HEADERS ... SOURCES ... PUBLIC ... PRIVATE ... OPTIONS ...)
-# makes target alidade_model and alias alidade::model. Without SOURCES it is header-only.
-# PUBLIC and PRIVATE name what it links; OPTIONS are compile options for its own sources.
-# INTERNAL: not part of the installed package. UNITY: see alidade_unity.
+# alidade_library(model [INTERNAL] [UNITY] [PRELUDE name] HEADERS ... SOURCES ... PUBLIC ...
+#                 PRIVATE ... OPTIONS ...)
+# makes target alidade_model and alias alidade::model. Without SOURCES it is header-only. PUBLIC and
+# PRIVATE name what it links; OPTIONS are compile options for its own sources. INTERNAL: not part of
+# the installed package. UNITY: see alidade_unity.
 function(alidade_library name)
   cmake_parse_arguments(A "INTERNAL;UNITY" "PRELUDE" "HEADERS;SOURCES;PUBLIC;PRIVATE;OPTIONS" ${ARGN})
   set(target alidade_${name})
@@ -132,7 +142,7 @@ function(alidade_library name)
     endif()
     if(TARGET alidade_${A_PRELUDE}_prelude)
       target_precompile_headers(${target} REUSE_FROM alidade_${A_PRELUDE}_prelude)
-      # The compiler takes a prelude only where the same macros are defined.
+      # The compiler uses a prelude only if the same macros are defined.
       get_property(links GLOBAL PROPERTY ALIDADE_PRELUDE_LINKS_${A_PRELUDE})
       list(TRANSFORM links REPLACE "(.+)" "$<BUILD_INTERFACE:\\1>")
       target_link_libraries(${target} PRIVATE ${links})
@@ -167,29 +177,31 @@ function(alidade_executable name)
   target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR})
 endfunction()
 
-# What is tested is built as it is shipped; to optimise the tests' own code would cost half of their compilation.
+# What is tested is built as it is shipped. To optimise the tests' own code would cost half of their
+# compilation time.
 set(ALIDADE_TEST_OPTIONS $<$<CONFIG:Release>:-O1>)
 
-# clang compiles Eigen's expressions in half of GCC's time. What is tested is GCC's, as it is shipped; the tests' own code is clang's where
-# there is one.
+# clang compiles Eigen's expressions in half of GCC's time. The code under test is compiled by GCC,
+# as it is shipped. The tests' own code is compiled by clang if it is installed.
 if(ALIDADE_BUILD_TESTS AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND NOT CMAKE_CROSSCOMPILING)
   find_program(ALIDADE_TEST_COMPILER NAMES clang++-14 DOC "Compiles the tests' own code, in GCC's place")
 endif()
 function(alidade_compile_as_test target)
   target_compile_options(${target} PRIVATE ${ALIDADE_TEST_OPTIONS})
   if(ALIDADE_TEST_COMPILER)
-    # Not the standard that clang takes when told of none: CMake asks GCC for none, whose own it is.
+    # clang's default standard is another one. CMake passes none to GCC, whose default it is.
     target_compile_options(${target} PRIVATE -std=gnu++17)
     set_property(TARGET ${target} PROPERTY CXX_COMPILER_LAUNCHER
       ${PROJECT_SOURCE_DIR}/cmake/compile-by ${ALIDADE_TEST_COMPILER} ${CMAKE_CXX_COMPILER} ${CMAKE_CXX_COMPILER_LAUNCHER})
   endif()
 endfunction()
 
-# What test programs share, compiled once: GoogleTest and Eigen are most of what each test file includes.
+# Headers that test programs share, compiled once: GoogleTest and Eigen are most of what each test
+# file includes.
 if(ALIDADE_BUILD_TESTS AND NOT ALIDADE_FUZZ)
   add_library(alidade_test_prelude OBJECT ${PROJECT_SOURCE_DIR}/cmake/prelude.cpp)
   target_link_libraries(alidade_test_prelude PRIVATE alidade_options Eigen3::Eigen GTest::gmock GTest::gtest)
-  # As the test programs are compiled, which use it.
+  # The same as for the test programs that use it.
   set_target_properties(alidade_test_prelude PROPERTIES POSITION_INDEPENDENT_CODE OFF)
   target_compile_options(alidade_test_prelude PRIVATE -fPIE)
   alidade_compile_as_test(alidade_test_prelude)
@@ -199,8 +211,8 @@ if(ALIDADE_BUILD_TESTS AND NOT ALIDADE_FUZZ)
 endif()
 
 # alidade_find_opencv(libraries core imgproc)
-# appends these modules to the variable, and finds OPENCV_INCLUDE_DIR. The modules alone: Debian keeps OpenCVConfig.cmake in
-# libopencv-dev, which brings in all of them.
+# appends these modules to the variable, and finds OPENCV_INCLUDE_DIR. It finds single modules,
+# because Debian has OpenCVConfig.cmake in libopencv-dev, which installs all of them.
 function(alidade_find_opencv libraries)
   find_path(OPENCV_INCLUDE_DIR opencv2/core.hpp PATH_SUFFIXES opencv4 REQUIRED)
   foreach(module IN LISTS ARGN)
@@ -212,8 +224,9 @@ function(alidade_find_opencv libraries)
 endfunction()
 
 # alidade_find_aruco()
-# finds OPENCV_ARUCO as ALIDADE_CHARUCO asks for; empty: without. After alidade_find_opencv(). The static library: the shared one lies in
-# Debian's libopencv-contrib406, which needs Qt and Tesseract wherever the executable runs.
+# sets OPENCV_ARUCO as ALIDADE_CHARUCO asks for; empty: without. Call it after
+# alidade_find_opencv(). It finds the static library: the shared one is in Debian's
+# libopencv-contrib406, which needs Qt and Tesseract wherever the executable runs.
 function(alidade_find_aruco)
   set(found "")
   if(NOT ALIDADE_CHARUCO STREQUAL "OFF")
@@ -229,10 +242,11 @@ function(alidade_find_aruco)
   set(OPENCV_ARUCO "${found}" PARENT_SCOPE)
 endfunction()
 
-# All test programs that another processor can run; what `cmake --build` of an ARM preset builds.
+# All test programs that can run on another processor; built by `cmake --build` of an ARM preset.
 add_custom_target(processor_programs)
 
-# All that the tests without the label `thorough` need, in two parts: the programs of core's rooms, core_*_test, and the others.
+# All programs for the tests without the label `thorough`, in two parts: those of core's rooms,
+# core_*_test, and the others.
 add_custom_target(core_programs)
 add_custom_target(outer_programs)
 add_custom_target(quick_programs)
@@ -241,14 +255,19 @@ add_dependencies(quick_programs core_programs outer_programs)
 # alidade_test(core_model_test SOURCES camera_test.cpp ... LINK alidade::model [options])
 # builds the GoogleTest program of a room and registers it with ctest as one entry of that name.
 #   SUPPORT     sources without tests of their own
-#   THREADED    those of SOURCES that a thread-sanitized build has: what shares memory between threads. None: no program there
-#   NATIVE      those of SOURCES that do not run under an emulated processor (programs are started, pseudo-terminals,
-#               libraries that the sysroot lacks), with NATIVE_SUPPORT and NATIVE_LINK; `NATIVE ALL`: the whole program
-#   THOROUGH    patterns of cases that only `scripts/test all` runs: entry NAME.thorough, with the label thorough
-#   UNSANITIZED patterns of cases from which a sanitizer learns nothing that others do not show it: repetition, long films.
-#               Under an emulated processor they are THOROUGH
-#   SHARDS      how many processes share the cases, for a room whose tests mostly wait
-#   COST        seconds, of a room that takes long: ctest starts the dearest first, so that none is left over at the end
+#   THREADED    the SOURCES of a thread-sanitized build: those that share memory between threads.
+#               Without them there is no program in that build
+#   NATIVE      the SOURCES that do not run under an emulated processor (they start programs, use
+#               pseudo-terminals or libraries that the sysroot lacks), with NATIVE_SUPPORT and
+#               NATIVE_LINK; `NATIVE ALL`: the whole program
+#   THOROUGH    patterns of cases that only `scripts/test all` runs: entry NAME.thorough, with the
+#               label thorough
+#   UNSANITIZED patterns of cases that show a sanitizer nothing new: repetition, long films. Under
+#   an
+#               emulated processor they are THOROUGH
+#   SHARDS      number of processes that share the cases, for a room whose tests mostly wait
+#   COST        seconds, for a room that takes long: ctest starts the most expensive first, so that
+#               none is left over at the end
 #   UNITY       see alidade_unity
 #   DEFINITIONS, DEPENDS, LABELS, TIMEOUT (s), RESOURCE_LOCK
 function(alidade_test name)
@@ -275,17 +294,18 @@ function(alidade_test name)
   alidade_executable(${name} SOURCES ${A_SOURCES} ${A_SUPPORT}
     LINK ${A_LINK} Eigen3::Eigen GTest::gmock GTest::gtest GTest::gtest_main)
   target_compile_definitions(${name} PRIVATE ${A_DEFINITIONS})
-  # The few with threads make other units than all of them, in which names of two sources may meet.
+  # The THREADED sources alone would form other units, in which names of two sources may clash.
   if(A_UNITY AND NOT ALIDADE_SANITIZE STREQUAL "thread")
     alidade_unity(${name})
   endif()
   alidade_compile_as_test(${name})
   if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND NOT ALIDADE_TEST_COMPILER)
-    # GCC 12 reports it inside inlined library code.
+    # GCC 12 warns inside inlined library code.
     target_compile_options(${name} PRIVATE -Wno-maybe-uninitialized)
   endif()
   target_precompile_headers(${name} REUSE_FROM alidade_test_prelude)
-  # No less: where a test and a library make the same function of a template, the linker takes the test's.
+  # Leaves out no further checks: if a test and a library instantiate the same template function,
+  # the linker takes the test's.
   alidade_leave_unchecked(${name})
   if(A_DEPENDS)
     add_dependencies(${name} ${A_DEPENDS})
@@ -313,14 +333,14 @@ function(alidade_test name)
   endif()
 endfunction()
 
-# One entry of ctest for the cases of a program that the filter leaves. Takes TIMEOUT, RESOURCE_LOCK, SHARDS and
-# COST from alidade_test.
+# Registers the program's cases that the filter selects as one entry of ctest. Uses TIMEOUT,
+# RESOURCE_LOCK, SHARDS and COST of alidade_test.
 function(alidade_register_cases program name filter labels)
-  # Only what hangs shall meet it: a shared machine is at times a third as fast.
+  # Only a test that hangs may reach it: a shared machine is at times a third as fast.
   if(NOT A_TIMEOUT)
     set(A_TIMEOUT 900)
   endif()
-  # An emulator is slower by ten to twenty times, a sanitizer by two to five.
+  # An emulator is ten to twenty times slower, a sanitizer two to five times.
   if(CMAKE_CROSSCOMPILING OR ALIDADE_SANITIZE)
     math(EXPR A_TIMEOUT "5 * ${A_TIMEOUT}")
   endif()
@@ -340,7 +360,7 @@ function(alidade_register_cases program name filter labels)
 endfunction()
 
 # alidade_benchmark(pt_mode_benchmark SOURCES ... LINK ...)
-# builds a Google Benchmark program; `ctest -L benchmark` runs it and keeps its JSON in
+# builds a Google Benchmark program. `ctest -L benchmark` runs it and stores its JSON in
 # <build>/benchmark-results/.
 function(alidade_benchmark name)
   cmake_parse_arguments(A "" "" "SOURCES;LINK" ${ARGN})
@@ -356,7 +376,8 @@ function(alidade_benchmark name)
   set_tests_properties(${name} PROPERTIES LABELS benchmark RUN_SERIAL ON TIMEOUT 600)
 endfunction()
 
-# What `ctest -L fuzz` runs, and all that the preset `fuzz` builds, by the outermost folder that a target links.
+# Programs that `ctest -L fuzz` runs and the preset `fuzz` builds, by the outermost folder that a
+# target links.
 add_custom_target(fuzz_programs)
 foreach(part core platform edge)
   add_custom_target(fuzz_${part}_programs)
@@ -364,11 +385,12 @@ foreach(part core platform edge)
 endforeach()
 
 # alidade_fuzz_target(vapix LINK alidade::platform [MUTATIONS n] [LONGEST bytes])
-# declares the target of vapix_fuzz.cpp. Under the preset `fuzz` it is a program of its own, fuzz_vapix, linked with
-# libFuzzer: `ctest -L fuzz` lets it search for a minute, or $FUZZ_SECONDS, from corpus/vapix and regressions/vapix on; what it finds worth
-# keeping goes to <build>/fuzz-corpus/vapix/, an input that fails to <build>/fuzz-artifacts/; ten million inputs
-# of no more bytes than that (1024) are `ctest --preset fuzz-long`. In all other builds it is a part of the program that
-# alidade_fuzz_regressions() makes, which runs those files and n mutations of them (5000).
+# declares the target of vapix_fuzz.cpp. Under the preset `fuzz` it is a program of its own,
+# fuzz_vapix, linked with libFuzzer. `ctest -L fuzz` lets it search for a minute, or $FUZZ_SECONDS,
+# starting from corpus/vapix and regressions/vapix. Inputs worth keeping go to
+# <build>/fuzz-corpus/vapix/, failing inputs to <build>/fuzz-artifacts/. `ctest --preset fuzz-long`
+# runs ten million inputs of at most LONGEST bytes (1024). In all other builds the target is part of
+# the program of alidade_fuzz_regressions(), which runs those files and n mutations of them (5000).
 function(alidade_fuzz_target name)
   cmake_parse_arguments(A "" "MUTATIONS;LONGEST" "LINK" ${ARGN})
   file(GLOB seeds CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/corpus/${name}/*)
@@ -388,7 +410,7 @@ function(alidade_fuzz_target name)
     return()
   endif()
   set(inputs ${CMAKE_CURRENT_SOURCE_DIR}/corpus/${name})
-  # Globbed at each build: the first regression of a target makes its folder.
+  # Globbed at each build: the first regression of a target creates its folder.
   file(GLOB regressions CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/regressions/${name})
   list(APPEND inputs ${regressions})
   set(found ${PROJECT_BINARY_DIR}/fuzz-corpus/${name})
@@ -415,12 +437,14 @@ function(alidade_fuzz_target name)
   endif()
   add_test(NAME fuzz_${name}_ten_million
     COMMAND fuzz_${name} ${search} -runs=10000000 -max_len=${A_LONGEST} ${found} ${inputs})
-  # A fifth faster; an input that fails tells more when it is run again without.
+  # These options make it a fifth faster. A failing input reports more when it is run again without
+  # them.
   set_tests_properties(fuzz_${name}_ten_million PROPERTIES LABELS "fuzz;slow" TIMEOUT 10800
     ENVIRONMENT ASAN_OPTIONS=malloc_context_size=0:quarantine_size_mb=16)
 endfunction()
 
-# Every *_fuzz.cpp here is of a target that has been declared, or is one of those named: none lies about unbuilt.
+# Checks that every *_fuzz.cpp here belongs to a declared target or to one of those named, so that
+# none is left unbuilt.
 function(alidade_require_fuzz_targets)
   get_property(declared GLOBAL PROPERTY ALIDADE_FUZZ_SOURCES)
   set(others ${ARGN})
@@ -434,7 +458,8 @@ function(alidade_require_fuzz_targets)
   endforeach()
 endfunction()
 
-# The program fuzz_regressions of all targets declared so far, and planted_defect_fuzz.cpp, which proves that it bites.
+# Builds the program fuzz_regressions of all targets declared so far and of planted_defect_fuzz.cpp,
+# which proves that it detects defects.
 function(alidade_fuzz_regressions)
   get_property(targets GLOBAL PROPERTY ALIDADE_FUZZ_TARGETS)
   get_property(libraries GLOBAL PROPERTY ALIDADE_FUZZ_LIBRARIES)

@@ -1,15 +1,14 @@
 #pragma once
-// AxisPairing: makes samples of readings that give one axis at a time, pan, tilt, pan, tilt, ...
+// AxisPairing: makes samples from readings of single axes: pan, tilt, pan, tilt, ...
 //
-// Pan and tilt of a sample belong to one moment, that of the tilt reading: the pan is interpolated
-// between the readings before and after it. With the middles t0 and t2 and half widths h0 and h2 of
-// the pan readings' intervals and t1, h1 of the tilt's, w = (t1 - t0) / (t2 - t0):
+// Pan and tilt of a sample belong to the moment of the tilt reading. The pan is interpolated
+// between the readings before and after it. Let t0, t2 be the middles and h0, h2 the half widths of
+// the pan readings' intervals, t1, h1 those of the tilt's, and w = (t1 - t0) / (t2 - t0):
 //   pan = pan0 + w wrap(pan2 - pan0), interval t1 -+ max(h1, (1 - w) h0 + w h2).
-// Without it pan and tilt would be apart by half a cycle: 15 ms at 34 Hz, more than any
-// clock offset can repair. The price is that a sample comes half a cycle later. Where both axes repeat
-// the reading before, the head is at rest or the device has not measured since: the sample repeats, too.
-//
-// Pure; radians and seconds; no allocation.
+// Without it pan and tilt would be half a cycle apart: 15 ms at 34 Hz, which no clock offset can
+// repair. The price: a sample comes half a cycle later. If both axes repeat their previous reading
+// (head at rest, or no new measurement in the device), the sample repeats too. No side effects, no
+// allocation; radians and seconds.
 
 #include <optional>
 
@@ -30,21 +29,21 @@ struct PairedReading {
 
 class AxisPairing {
  public:
-  // A gap: what was read before is not interpolated with what comes.
+  // Call it at a gap: earlier readings are not interpolated with later ones.
   void reset();
 
-  // Later than all before. A sample comes with the pan after the tilt.
+  // Readings come in order of time. Returns a sample for the pan that follows a tilt.
   std::optional<PairedReading> add_pan(const AxisReading& pan);
   void add_tilt(const AxisReading& tilt);
 
  private:
   std::optional<AxisReading> pan_;
-  std::optional<AxisReading> tilt_;  // since that pan
-  std::optional<double> last_tilt_;  // rad, before that pan
-  bool pan_repeats_ = false;         // the reading before it
+  std::optional<AxisReading> tilt_;  // read since pan_
+  std::optional<double> last_tilt_;  // rad; read before pan_
+  bool pan_repeats_ = false;         // pan_ repeats the pan before it
   bool tilt_repeats_ = false;
 };
 
-[[nodiscard]] double wrap_to_half_turn(double angle_rad);  // into [-pi, pi)
+[[nodiscard]] double wrap_to_half_turn(double angle_rad);  // to [-pi, pi)
 
 }  // namespace alidade

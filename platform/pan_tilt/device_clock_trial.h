@@ -1,10 +1,11 @@
 #pragma once
-// DeviceClockTrial: whether the times that a polled device tells with its answers are of use.
+// DeviceClockTrial: decides whether the times in a polled device's answers are useful.
 //
-// Devices tell the time of the measurement, the time of the answer, whole seconds, always the same,
-// or nothing. Of use is what never goes backwards, is finer than whole seconds, and advances no
-// faster than the host's clock (within kSlack_s). The verdict comes with the second change, or as
-// "no" when that is long in coming; it then stands. Pure, one thread.
+// Devices report the time of the measurement, the time of the answer, whole seconds, a constant, or
+// nothing. Times are useful if they never go backwards, are finer than whole seconds, and advance
+// at the rate of the host's clock (within kSlack_s). The verdict comes with the second change of
+// the device time, or is kUseless if that takes too long; it is then final. No side effects; one
+// thread.
 
 #include <cmath>
 #include <optional>
@@ -15,7 +16,7 @@ class DeviceClockTrial {
  public:
   enum class Verdict { kOpen, kUseful, kUseless };
 
-  // device_time_s of an answer that came at host_time_s.
+  // device_time_s: from the answer received at host_time_s. nullopt gives kUseless.
   Verdict add(std::optional<double> device_time_s, double host_time_s) {
     if (verdict_ != Verdict::kOpen) {
       return verdict_;

@@ -1,7 +1,9 @@
 #pragma once
-// The heads that QuerySource can ask, each with one row. Sources, configuration, tests, fuzz targets and soak
-// take their lists from here, but for the simulated ones, kHeadModels, which a test holds against it; a switch over HeadType or a visit of HeadOptions that lacks one does not
-// compile, and CMake names a file that one lacks. How to add a head: README.md of this folder.
+// The heads that QuerySource can poll, one row each. Sources, configuration, tests, fuzz targets
+// and the soak test take their lists from here. The simulated heads have a list of their own,
+// kHeadModels; a test compares it with this one. A switch over HeadType or a visit of HeadOptions
+// that lacks a head does not compile, and CMake names a missing file. How to add a head: README.md
+// of this folder.
 
 #include <array>
 #include <cstddef>
@@ -25,11 +27,12 @@ using HeadOptions = std::variant<PelcoDOptions, ViscaOptions, PtuOptions>;
 
 struct Head {
   HeadType type;
-  const char* key;   // pan_tilt.type of the configuration; KEY_protocol.h, .cpp, KEY_fuzz.cpp ...
-  UsualSigns signs;  // as the protocol defines them
+  const char* key;   // pan_tilt.type in the configuration; also in file names: KEY_protocol.h,
+                     // KEY_fuzz.cpp ...
+  UsualSigns signs;  // as defined by the protocol
 };
 
-// cmake/AlidadeHeads.cmake reads these lines, too: one a head.
+// cmake/AlidadeHeads.cmake parses these lines, too: one line a head.
 inline constexpr std::array<Head, std::variant_size_v<HeadOptions>> kHeads = {{
     {HeadType::kPelcoD, "pelco_d", {1, -1}},
     {HeadType::kVisca, "visca", kSignsOfTheMaker},
@@ -52,7 +55,7 @@ static_assert(has_a_row_for_each_head(), "kHeads and HeadType must have one orde
 
 }  // namespace internal
 
-// None: no head is called so.
+// nullopt: there is no head of this name.
 [[nodiscard]] inline std::optional<HeadType> head_type_of(std::string_view key) {
   for (const Head& head : kHeads) {
     if (head.key == key) return head.type;

@@ -65,7 +65,7 @@ class HttpPollingSource : public PanTiltSource {
   bool make_handle();
   void start_request(double now_s);
   void send_request(const std::string& url, bool elsewhere);
-  // kOk: the answer is none. kTimeout: it is asked elsewhere.
+  // kOk: the answer is not a redirection. kTimeout: the request was sent to another URL.
   ReadStatus follow_redirection();
   bool request_is_over(CURLcode* code);
   [[nodiscard]] long status() const {
@@ -74,7 +74,7 @@ class HttpPollingSource : public PanTiltSource {
     return status;
   }
   HttpAnswer answer() const;
-  // kTimeout: it gave no sample, and was no failure.
+  // kTimeout: no sample, but no failure either.
   ReadStatus finish_request(CURLcode code, PanTiltSample* sample);
   ReadStatus fail(const std::string& error);
   ReadStatus disconnect(const std::string& error) { return pause(error, backoff_.next_s()); }
@@ -89,29 +89,29 @@ class HttpPollingSource : public PanTiltSource {
 
   char curl_error_[CURL_ERROR_SIZE] = "";
   CurlMultiPtr multi_;
-  CurlEasyPtr easy_;        // one for all requests: it keeps the connection and the digest's nonce
-  bool logged_in_ = false;  // the nonce was good
-  long method_ = kDigest;   // basic only where it is permitted, and nothing else offered
+  CurlEasyPtr easy_;        // one for all requests: keeps the connection and the digest nonce
+  bool logged_in_ = false;  // the nonce was accepted
+  long method_ = kDigest;   // basic only where it is permitted and the only method offered
 
   double period_s_;
-  double due_s_ = 0;     // when the next poll is to be sent
-  bool ask_on_ = false;  // the next request does not wait for that
+  double due_s_ = 0;     // when to send the next poll
+  bool ask_on_ = false;  // the next request is sent at once
   Backoff backoff_;
   bool restarted_ = true;
   bool worked_ = false;  // a sample has come, or could have
-  int refusals_ = 0;     // of the login, since the latest sample
+  int refusals_ = 0;     // refused logins since the latest sample
   SourceNotes notes_;
 
-  // The request under way.
+  // The outstanding request.
   bool under_way_ = false;
   HttpRequest request_;
-  std::string asked_;  // its URL, after so many redirections
+  std::string asked_;  // its URL, after redirections_ redirections
   int redirections_ = 0;
-  bool elsewhere_ = false;  // not where the login goes
+  bool elsewhere_ = false;  // at another host, port or scheme: without login
   HeaderListPtr headers_;
   double started_s_ = 0;
-  double previous_answer_s_ = 0;  // to this request: a 401 before the answer
-  double answer_s_ = 0;           // when the first bytes of the latest answer were here
+  double previous_answer_s_ = 0;  // of an answer 401 to the same request, before the latest answer
+  double answer_s_ = 0;           // arrival of the first bytes of the latest answer
   std::size_t header_bytes_ = 0;
   std::string body_;
 };
@@ -186,8 +186,8 @@ ReadStatus HttpPollingSource::pause(const std::string& error, double pause_s) {
   return ReadStatus::kDisconnected;
 }
 
-// The login, of a device that was in use. The nonces that it gave go with the handle: by the next
-// try they may be too old, and libcurl would take that for a wrong password.
+// A device that has worked refuses the login. The nonces are dropped with the handle: they may be
+// too old at the next attempt, and libcurl would take that for a wrong password.
 ReadStatus HttpPollingSource::refuse(const std::string& error) {
   method_ = kDigest;
   if (!make_handle()) {
@@ -203,7 +203,7 @@ ReadStatus HttpPollingSource::refuse(const std::string& error) {
 
 void HttpPollingSource::start_request(double now_s) {
   if (!std::exchange(ask_on_, false)) {
-    // The next point of the grid that lies ahead.
+    // The next grid point in the future.
     due_s_ = due_s_ == 0
                  ? now_s + period_s_
                  : due_s_ + period_s_ * std::max(1.0, std::ceil((now_s - due_s_) / period_s_));
@@ -264,9 +264,9 @@ HttpAnswer HttpPollingSource::answer() const {
     answer.login_error = login_error(easy_.get(), options_.user, method_);
   }
   answer.body = body_;
-  // The request was sent after the connection stood (libcurl counts from a moment after started_s_)
-  // and after the 401 that may have gone before. CURLINFO_PRETRANSFER_TIME_T is too late: it is taken
-  // when the request has left.
+  // The request was sent after the connection was established (libcurl counts from a moment after
+  // started_s_) and after a possible 401. CURLINFO_PRETRANSFER_TIME_T is too late: it is taken when
+  // the request has been sent.
   curl_off_t connected_us = 0;
   curl_off_t encrypted_us = 0;
   curl_easy_getinfo(easy_.get(), CURLINFO_CONNECT_TIME_T, &connected_us);
@@ -325,8 +325,8 @@ ReadStatus HttpPollingSource::finish_request(CURLcode code, PanTiltSample* sampl
     return ReadStatus::kTimeout;
   }
   if (given.status == 401 && std::exchange(logged_in_, false)) {
-    // A camera that has restarted does not know the nonces it gave, and where it does not call them stale
-    // libcurl believes that the password is wrong: once more, without them.
+    // A rebooted camera does not know its earlier nonces. If it does not call them stale, libcurl
+    // believes that the password is wrong. Try once more without them.
     if (!make_handle()) {
       return fail(kNoCurl);
     }
@@ -394,7 +394,7 @@ ReadStatus HttpPollingSource::read(PanTiltSample& sample, double timeout_s) {
       return ReadStatus::kTimeout;
     }
     if (!ask_on_) {
-      // Until the transfer moves on, stop() is called, or the time is over.
+      // Until the transfer progresses, stop() is called, or the time is over.
       const double until_s = under_way_ ? deadline_s : std::min(due_s_, deadline_s);
       curl_multi_poll(multi_.get(), nullptr, 0, poll_milliseconds(until_s - now_s), nullptr);
     }

@@ -1,18 +1,12 @@
 #pragma once
-// open_http_polling(): a PanTiltSource that asks a device again and again over one kept HTTP
-// connection (libcurl). What is asked and what the answers mean is an HttpConversation's business,
-// which has no I/O of its own.
-//
-// Samples are polled on a fixed grid of 1/rate_hz; a late answer skips grid points and does not
-// shift the grid. The answer was true between earliest_time_s, just before the request was sent,
-// and latest_time_s, when the answer's first bytes were here. A server that writes header and body
-// in two pieces may hold the second back for the 40 ms of a delayed acknowledgement: that limits
-// the rate, not the interval. kDisconnected: unreachable, timed out, or what the conversation
-// takes for such; the next try comes after a growing pause. kFailed: unusable URL, or what the
-// conversation takes for good, a refused login among it, said only until the first sample has come:
-// a device that starts again may refuse for a while. It is then tried again ever more rarely, up to
-// kMostRefusalPauses of the longest pause apart, as devices lock a user out after a few wrong
-// logins. read() runs the transfer on the calling thread; it allocates.
+// open_http_polling(): a PanTiltSource that polls a device over one persistent HTTP connection
+// (libcurl). An HttpConversation, which does no I/O, makes the requests and interprets the answers.
+// Polls lie on a fixed grid of 1/rate_hz; a late answer skips grid points and does not shift the
+// grid. kDisconnected: unreachable, timed out, or an error that the conversation reports as such;
+// the next attempt follows after a growing pause. kFailed: unusable URL, or a permanent error of
+// the conversation such as a refused login, but only before the first sample. Later a rebooting
+// device may refuse for a while (kMostRefusalPauses). read() runs the transfer on the calling
+// thread and allocates.
 
 #include <memory>
 #include <optional>
@@ -28,18 +22,21 @@ namespace alidade {
 
 struct HttpRequest {
   std::string url;
-  std::optional<std::string> body;   // POSTed; none: GET
+  std::optional<std::string> body;   // sent by POST; nullopt: GET
   std::vector<std::string> headers;  // "Name: value"
-  bool digest = true;                // log in by HTTP digest, if there is a user
-  bool body_logs_in = false;         // the body holds a login, and goes nowhere else
+  bool digest = true;                // log in by HTTP digest if a user is configured
+  bool body_logs_in = false;         // the body holds a login: never send it elsewhere
 };
 
 struct HttpAnswer {
   long status = 0;
   std::string body;
-  bool offers_digest = false;  // with 401; or basic, where it is permitted (link_rules.h)
-  bool only_basic = false;     // with 401: offered, and not permitted
+  bool offers_digest = false;  // with 401: digest, or basic where permitted (link_rules.h)
+  bool only_basic = false;     // with 401: only basic is offered, and it is not permitted
   std::string login_error;     // with 401: one line on what may be wrong
+  // s, host CLOCK_MONOTONIC. The answer was true between just before the request was sent and the
+  // arrival of its first bytes. A server that writes header and body separately may delay the body
+  // by the 40 ms of a delayed acknowledgement: that limits the rate, not this interval.
   double earliest_time_s = 0;
   double latest_time_s = 0;
 };
@@ -47,66 +44,66 @@ struct HttpAnswer {
 class HttpConversation {
  public:
   enum class Outcome {
-    kSample,        // *sample holds pan, tilt, zoom, device time; the next request is paced
+    kSample,        // *sample holds pan, tilt, zoom, device time; the next request is on the grid
     kAskOn,         // the next request follows at once
-    kNothing,       // no sample; the next request is paced
-    kDisconnected,  // *error says why; next_request() begins anew after a pause
-    kRefused,       // *error says why the login is wrong; as kFailed, and seldom tried again
-    kFailed         // *error says why; as kDisconnected once there has been a sample
+    kNothing,       // no sample; the next request is on the grid
+    kDisconnected,  // *error says why; next_request() starts anew after a pause
+    kRefused,       // *error says why the login is wrong; like kFailed, but later rarely retried
+    kFailed         // *error says why; like kDisconnected once there has been a sample
   };
 
   virtual ~HttpConversation() = default;
   // now_s: host CLOCK_MONOTONIC.
   virtual HttpRequest next_request(double now_s) = 0;
   virtual Outcome take(const HttpAnswer& answer, PanTiltSample* sample, std::string* error) = 0;
-  // A request got no answer. kAskOn: next_request() has another to make at once; else
+  // A request got no answer. kAskOn: next_request() has an alternative to send at once. Otherwise
   // kDisconnected.
   virtual Outcome unanswered() {
     reset();
     return Outcome::kDisconnected;
   }
-  // What had worked has failed: begin anew.
+  // A working connection has failed: start anew.
   virtual void reset() = 0;
-  // What the device does otherwise than its protocol says, as far as is known, for
-  // PanTiltSource::take_notes.
+  // How the device is known to deviate from its protocol, for PanTiltSource::take_notes.
   [[nodiscard]] virtual std::vector<std::string> notes() const { return {}; }
 };
 
-// Of HttpDeviceOptions::max_backoff_s: the longest pause between two tries of a login that was
-// right before.
+// Longest pause between two attempts of a login that was accepted before, in units of
+// HttpDeviceOptions::max_backoff_s. It is long because devices lock a user out after a few wrong
+// logins.
 constexpr double kMostRefusalPauses = 12;
 
-// What the user says about any device that is polled.
+// The user's options for any polled device.
 struct HttpDeviceOptions {
   std::string url;   // http://host[:port] or https://...
-  std::string user;  // these go before what the URL may hold
+  std::string user;  // user and password take precedence over those in the URL
   std::string password;
   LinkRules rules;
-  AxisMapping pan;  // of the angle that is taken from an answer
+  AxisMapping pan;  // applied to the angle parsed from an answer
   AxisMapping tilt;
   double rate_hz = 30;
   double timeout_s = 1;      // for one request
-  double max_backoff_s = 5;  // longest pause between two tries
+  double max_backoff_s = 5;  // longest pause between two attempts
 };
 
 struct HttpPollingOptions : HttpDeviceOptions {
-  std::string name;             // of the source: the URL without password
-  Url configured;               // the same
-  std::size_t max_body = 4096;  // bytes of an answer
-  std::string expected;         // what an answer is: "a camera's position"
+  std::string name;             // name of the source: the URL without password
+  Url configured;               // the same URL, parsed
+  std::size_t max_body = 4096;  // bytes; longest answer
+  std::string expected;         // what an answer holds, for errors: "a camera's position"
 };
 
-// All that a source needs.
+// Everything that a source needs.
 struct HttpPollingPlan {
   HttpPollingOptions options;
   std::unique_ptr<HttpConversation> conversation;
-  std::string error;  // why no request can ever be made; empty: none
+  std::string error;  // why no request can ever be made; empty if it can
 };
 
 [[nodiscard]] std::unique_ptr<PanTiltSource> open_http_polling(HttpPollingPlan plan);
 
-// The parts of options->url. Takes user and password out of it where options have none, and puts its bare
-// form into options->name. Empty, or what is wrong.
+// Splits options->url. Takes user and password from it if options have none, and puts the URL
+// without them into options->name. Returns what is wrong, or empty.
 [[nodiscard]] std::string take_http_url(Url* url, HttpPollingOptions* options);
 
 }  // namespace alidade

@@ -16,12 +16,12 @@ constexpr const char* kMediaPaths[] = {"/onvif/media_service", "/onvif/Media", "
 
 struct ToldAddress {
   std::string scheme;
-  std::string host;  // empty: none is told
+  std::string host;  // empty: none is given
   std::string port;
   std::string path;
 };
 
-// Not by libcurl, which takes onvif for the host of http:///onvif/ptz.
+// Not parsed by libcurl, which takes onvif for the host of http:///onvif/ptz.
 ToldAddress parse_told(const std::string& told) {
   ToldAddress address;
   const std::size_t scheme_end = told.find("://");
@@ -36,7 +36,7 @@ ToldAddress parse_told(const std::string& told) {
   address.host = rest.substr(0, path_begin);
   const std::size_t user_end = address.host.rfind('@');
   address.host.erase(0, user_end == std::string::npos ? 0 : user_end + 1);
-  const std::size_t bracket = address.host.rfind(']');  // of an address of IPv6
+  const std::size_t bracket = address.host.rfind(']');  // end of an IPv6 address
   const std::size_t colon = address.host.find(':', bracket == std::string::npos ? 0 : bracket);
   if (colon != std::string::npos) {
     address.port = address.host.substr(colon + 1);

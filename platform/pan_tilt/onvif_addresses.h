@@ -1,7 +1,7 @@
 #pragma once
-// Where the services of an ONVIF device are reached. What a device tells of it is often wrong: no
-// host, 0.0.0.0, 127.0.0.1, the address on the other side of a router, a port that is not
-// forwarded, the path of another service. Pure.
+// Candidate URLs of the services of an ONVIF device. The address that a device reports is often
+// wrong: no host, 0.0.0.0, 127.0.0.1, the address on the other side of a router, a port that is not
+// forwarded, the path of another service. No side effects.
 
 #include <string>
 #include <vector>
@@ -12,16 +12,16 @@ namespace alidade {
 
 enum class OnvifService { kMedia, kPtz };
 
-// URLs to try, best first, none twice; all of `device`'s host, whatever host is told, as logins go
-// there. device: of the device service. told: what the device tells, may be empty. A port of its
-// own counts where the host that is told is the device's and no login goes along (other_port). Then the
-// path that is told, at the device's own port, also behind the prefix of a proxy (http://proxy/cam1/onvif/device_service),
-// then the paths that are usual.
+// URLs to try, best first, without duplicates. All are at the host of `device` (the URL of the
+// device service), as logins are sent there. told: the address that the device reports; may be
+// empty. Order: the reported port and path, if the reported host is the device's and no login is
+// sent (other_port); the reported path at the device's own port, also behind the prefix of a proxy
+// (http://proxy/cam1/onvif/device_service); the usual paths; the URL of the device service itself.
 [[nodiscard]] std::vector<std::string> onvif_addresses(const Url& device, const std::string& told,
                                                        OnvifService service,
                                                        bool other_port = false);
 
-// http://host:port of device with this path, or with the port that stands before it: ":8080/path".
+// device's http://host:port with this path. A path may start with another port: ":8080/path".
 [[nodiscard]] std::string onvif_address(const Url& device, const std::string& path);
 
 }  // namespace alidade

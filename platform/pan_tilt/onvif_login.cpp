@@ -6,8 +6,8 @@
 namespace alidade {
 namespace {
 
-// Clocks that differ by less are one: devices tell whole seconds, and take tokens that are some
-// seconds old.
+// s; clocks that differ by less count as equal: devices report whole seconds and accept tokens that
+// are some seconds old.
 constexpr double kSameClock_s = 3;
 
 std::string lead_text(double lead_s) {
@@ -30,7 +30,7 @@ void OnvifLoginWays::set_clock(const std::optional<OnvifClock>& told, double mon
   local_minus_monotonic_s_ = less_monotonic(clock.local_s);
   utc_minus_monotonic_s_ = utc_s - monotonic_s;
   if (way_ == Way::kDeviceClock && !device_minus_monotonic_s_) {
-    way_ = Way::kHostClock;  // the best guess
+    way_ = Way::kHostClock;  // best guess
   } else if (!good_ && tried_.empty() && way_ == Way::kHostClock && device_minus_monotonic_s_) {
     way_ = Way::kDeviceClock;
   }
@@ -43,7 +43,7 @@ double OnvifLoginWays::created_utc_s(double monotonic_s, double utc_s) const {
   return offset_s ? monotonic_s + *offset_s : utc_s;
 }
 
-// Of the way's clock over the host's; none: the device does not tell it.
+// Lead of the way's clock over the host's UTC; nullopt: the device does not report it.
 std::optional<double> OnvifLoginWays::lead_s(Way way) const {
   const auto less_utc = [this](const std::optional<double>& offset_s) {
     return offset_s ? std::optional(*offset_s - utc_minus_monotonic_s_) : std::nullopt;
@@ -61,7 +61,7 @@ std::optional<double> OnvifLoginWays::lead_s(Way way) const {
   return std::nullopt;
 }
 
-// Neither it nor a token of the same time was tried.
+// True if neither this way nor a token with the same time was tried.
 bool OnvifLoginWays::is_new(Way way) const {
   const std::optional<double> mine_s = lead_s(way);
   return std::none_of(tried_.begin(), tried_.end(), [&](Way other) {

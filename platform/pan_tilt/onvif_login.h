@@ -1,13 +1,12 @@
 #pragma once
-// OnvifLoginWays: in which ways a login at an ONVIF device is tried, in which order, and which was
-// good.
+// OnvifLoginWays: the ways to log in at an ONVIF device, their order, and the one that works.
 //
-// A WS-UsernameToken names the time of its creation, which the device holds against a clock: the
-// one that it tells as UTC; or the true time, where what it tells as UTC is its local time; or the
-// local time that it tells besides. Other devices want HTTP digest, and offer it. Devices lock a
-// user out after three to five wrong logins: at most kMostTries differ in one go, no clock is tried
-// twice, and where a login was good before, one is tried after each pause (HttpPollingSource), and
-// each way twice: the clock may have been set.
+// A WS-UsernameToken holds the time of its creation. The device compares it with a clock: the one
+// that it reports as UTC; or the true time, if it reports its local time as UTC; or the local time
+// that it reports besides. Other devices want HTTP digest, and offer it. Devices lock a user out
+// after three to five wrong logins. Therefore at most kMostTries ways are tried in one go, and no
+// clock twice. If a login was accepted before, one attempt follows each pause (HttpPollingSource)
+// and each way gets two: the device's clock may have been set.
 
 #include <optional>
 #include <string>
@@ -22,22 +21,23 @@ class OnvifLoginWays {
   enum class Way { kDeviceClock, kHostClock, kLocalClock, kDigest };
   static constexpr int kMostTries = 3;
 
-  // What the device tells of its clock; none: nothing. Both times are those of the answer.
+  // told: the clock that the device reports; nullopt: none. Both times (s) are those of the
+  // answer.
   void set_clock(const std::optional<OnvifClock>& told, double monotonic_s, double utc_s);
 
   [[nodiscard]] Way way() const { return way_; }
-  // For a token at this time; not of kDigest. utc_s: of the host.
+  // Creation time for a token; not for kDigest. utc_s: of the host.
   [[nodiscard]] double created_utc_s(double monotonic_s, double utc_s) const;
 
-  // The login was refused. True: another way is to be tried at once.
+  // The login was refused. True: try another way at once.
   [[nodiscard]] bool refused(bool offers_digest);
-  // It was good, now at the latest.
+  // The login was accepted.
   void accepted();
   [[nodiscard]] bool was_good() const { return good_.has_value(); }
 
-  // "; tried by ..." where by more than one clock.
+  // "; tried by ..." if more than one clock was tried, else empty.
   [[nodiscard]] std::string tried_text() const { return tried_text_; }
-  // What the device does otherwise than the standard says; empty: nothing.
+  // How the device deviates from the standard; empty if it does not.
   [[nodiscard]] std::string note() const;
 
  private:
@@ -48,12 +48,12 @@ class OnvifLoginWays {
 
   Way way_ = Way::kDeviceClock;
   std::optional<Way> good_;
-  std::vector<Way> tried_;      // refused since a login was good, or since the last go
+  std::vector<Way> tried_;      // refused since a login was accepted, or since the last go
   bool offers_digest_ = false;  // in one of the refusals
-  bool again_ = false;          // way_ was refused once since it was good
+  bool again_ = false;          // way_ was refused once since it was accepted
   std::string tried_text_;
-  bool tells_utc_ = true;  // the device; else at most a local time
-  // The clocks that the device tells, less the host's monotonic one and less its UTC.
+  bool tells_utc_ = true;  // the device reports UTC, not only a local time
+  // s; the clocks that the device reports, minus the host's monotonic clock.
   std::optional<double> device_minus_monotonic_s_;
   std::optional<double> local_minus_monotonic_s_;
   double utc_minus_monotonic_s_ = 0;

@@ -18,7 +18,7 @@
 namespace alidade {
 namespace {
 
-constexpr std::size_t kShown = 120;  // bytes of a foreign text that an error repeats
+constexpr std::size_t kShown = 120;  // bytes of foreign text quoted in an error
 constexpr const char* kWss = "http://docs.oasis-open.org/wss/2004/01/oasis-200401-wss-";
 
 // --- text
@@ -78,7 +78,7 @@ pugi::xml_node load_body(std::string_view bytes, pugi::xml_document* document) {
   return descendant(document->root(), {"Envelope", "Body"});
 }
 
-// The element that answers `call`; a null node with *error if it is not there.
+// The element that answers `call`. If it is missing: a null node and *error.
 pugi::xml_node load_answer(std::string_view bytes, const OnvifCall& call,
                            pugi::xml_document* document, std::string* error) {
   const pugi::xml_node answer =
@@ -91,7 +91,7 @@ pugi::xml_node load_answer(std::string_view bytes, const OnvifCall& call,
   return answer;
 }
 
-// A date and time of three and three numbers; none: it is not whole.
+// A date and time of three numbers each; nullopt: incomplete.
 std::optional<double> civil_time(const pugi::xml_node& node) {
   bool whole = true;
   const auto number = [&](const char* part, const char* name) {
@@ -110,7 +110,7 @@ std::optional<double> civil_time(const pugi::xml_node& node) {
   return whole ? unix_time(civil) : std::nullopt;
 }
 
-// <Min/><Max/>; none: it is not both.
+// <Min/><Max/>; nullopt unless both are there.
 std::optional<OnvifInterval> interval(const pugi::xml_node& node) {
   const auto end = [&node](const char* name) { return parse_number(text_of(child(node, name))); };
   const std::optional<double> low = end("Min");
@@ -127,7 +127,7 @@ void add_ranges(const pugi::xml_node& spaces, std::vector<OnvifSpaceRange>* rang
   }
 }
 
-// Of WS-Security's and ONVIF's codes those that refuse a login.
+// True for the codes of WS-Security and ONVIF that refuse a login.
 bool is_of_login(std::string_view code) {
   constexpr std::string_view kCodes[] = {"NotAuthorized",   "FailedAuthentication",
                                          "InvalidSecurity", "InvalidSecurityToken",
@@ -135,7 +135,7 @@ bool is_of_login(std::string_view code) {
   return std::find(std::begin(kCodes), std::end(kCodes), code) != std::end(kCodes);
 }
 
-// Some devices say in the reason alone that they refuse a login.
+// Some devices say only in the reason that they refuse a login.
 bool names_login(std::string reason) {
   std::transform(reason.begin(), reason.end(), reason.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
@@ -145,7 +145,7 @@ bool names_login(std::string reason) {
          reason.find("authentication fail") != std::string::npos;
 }
 
-// NoProfile, NoPTZProfile, NoStatus, NoEntity, ...: what was asked was understood.
+// NoProfile, NoPTZProfile, NoStatus, NoEntity, ...: the service understood the request.
 bool is_of_a_service(std::string_view code) {
   return code == "InvalidArgVal" ||
          (code.size() > 2 && code.substr(0, 2) == "No" && code[2] >= 'A' && code[2] <= 'Z');
@@ -210,7 +210,7 @@ std::optional<SoapFault> parse_soap_fault(std::string_view body) {
   if (!fault) {
     return std::nullopt;
   }
-  // The innermost code says most. SOAP 1.1 has faultcode and faultstring in place of all that.
+  // The innermost code is the most specific. SOAP 1.1 has faultcode and faultstring instead.
   constexpr int kDepth = 5;
   pugi::xml_node code = child(fault, "Code");
   for (int depth = 0; depth < kDepth && child(code, "Subcode"); ++depth) {

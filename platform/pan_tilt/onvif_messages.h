@@ -1,7 +1,7 @@
 #pragma once
-// The words of ONVIF (SOAP 1.2): requests as text, answers as values. Pure: bytes in, value or a
-// one-line error out (XML by pugixml, which expands no entities of a document's own); namespace
-// prefixes are as the device likes.
+// ONVIF messages (SOAP 1.2): requests as text, answers as values. No side effects: bytes in, value
+// or a one-line error out. XML is parsed by pugixml, which expands no entities that a document
+// defines. Namespace prefixes may be any.
 //   GetSystemDateAndTime, GetCapabilities, GetServices   device service
 //   GetProfiles                                          media service
 //   GetStatus, GetNodes, GetConfigurationOptions         PTZ service
@@ -37,43 +37,44 @@ constexpr OnvifCall kGetStatus{kOnvifPtz, "GetStatus"};
 constexpr OnvifCall kGetNodes{kOnvifPtz, "GetNodes"};
 constexpr OnvifCall kGetConfigurationOptions{kOnvifPtz, "GetConfigurationOptions"};
 
-// The envelope with the call. token: the ProfileToken of GetStatus, the ConfigurationToken of
-// GetConfigurationOptions; unused by the others.
+// The envelope with the call. token: the ProfileToken of GetStatus or the ConfigurationToken of
+// GetConfigurationOptions; the other calls have none.
 [[nodiscard]] std::string onvif_request(const OnvifCall& call, const std::string& token,
                                         const std::optional<OnvifLogin>& login);
 
-// "Content-Type: ..." of that envelope.
+// "Content-Type: ..." of this envelope.
 [[nodiscard]] std::string onvif_content_type(const OnvifCall& call);
 
 struct SoapFault {
   bool not_authorized = false;
-  bool of_a_service = false;  // the right one: it misses a profile or finds an argument wrong
+  bool of_a_service = false;  // from the right service: a profile is missing or an argument is
+                              // wrong
   std::string text;           // "ter:NotAuthorized: Sender not authorized"
 };
 
-// Empty if the body is no fault.
+// nullopt if the body is not a fault.
 [[nodiscard]] std::optional<SoapFault> parse_soap_fault(std::string_view body);
 
-// The body holds the answer to the call, whatever it says.
+// True if the body is an answer to the call, whatever its content.
 [[nodiscard]] bool is_onvif_answer(std::string_view body, const OnvifCall& call);
 
-// What a device tells of its clock, in whole seconds; one of both at least.
+// The device's clock, in whole seconds. At least one of the two is given.
 struct OnvifClock {
   std::optional<double> utc_s;    // Unix time
   std::optional<double> local_s;  // local date and time, read as if it were UTC
 };
 [[nodiscard]] bool parse_onvif_clock(std::string_view body, OnvifClock* clock, std::string* error);
 
-// URLs as the device tells them; empty: none.
+// URLs as the device reports them; empty: none.
 struct OnvifServices {
   std::string ptz;
   std::string media;
 };
-// Of the answer to GetCapabilities or GetServices. False: no PTZ service is named.
+// Parses the answer to GetCapabilities or GetServices. False: it names no PTZ service.
 [[nodiscard]] bool parse_onvif_services(std::string_view body, OnvifServices* services,
                                         std::string* error);
 
-// The first profile that has a PTZ configuration, by tokens; the last two may be empty.
+// Tokens of the first profile that has a PTZ configuration; the last two may be empty.
 struct OnvifProfile {
   std::string token;
   std::string configuration;
@@ -82,7 +83,7 @@ struct OnvifProfile {
 [[nodiscard]] bool parse_onvif_profile(std::string_view body, OnvifProfile* profile,
                                        std::string* error);
 
-// Lowest and highest value on the scale of an axis.
+// Lowest and highest value of an axis, in device units.
 struct OnvifInterval {
   double low = 0;
   double high = 0;
@@ -94,12 +95,12 @@ struct OnvifSpaceRange {
   std::optional<OnvifInterval> pan;
   std::optional<OnvifInterval> tilt;
 };
-// Of the answer to GetNodes or GetConfigurationOptions. node: its spaces are taken, those of all
-// nodes if it is empty or not there. False: none is declared.
+// Parses the answer to GetNodes or GetConfigurationOptions. node: takes the spaces of this node, or
+// of all nodes if it is empty or missing. False: no range is declared.
 [[nodiscard]] bool parse_onvif_ranges(std::string_view body, const std::string& node,
                                       std::vector<OnvifSpaceRange>* ranges, std::string* error);
 
-// The position as the device tells it, on whatever scale.
+// The position in the device's own units.
 struct OnvifStatus {
   double pan = 0;
   double tilt = 0;

@@ -12,9 +12,10 @@ namespace {
 
 constexpr OnvifInterval kGenericScale{-1, 1};
 constexpr OnvifInterval kDegreesScale{-360, 360};
-constexpr double kRounding = 0.005;    // of a scale: positions beyond its ends by that are not rare
-constexpr double kLargestEnd = 1e6;    // a declared end beyond that is a placeholder
-constexpr double kLeastPan_deg = 180;  // a pan that turns over less is not seen to be in degrees
+constexpr double kRounding = 0.005;    // of a scale: positions often exceed its ends by this
+                                       // fraction
+constexpr double kLargestEnd = 1e6;    // a declared end beyond this is a placeholder
+constexpr double kLeastPan_deg = 180;  // a pan range below this is not recognised as degrees
 constexpr std::size_t kShownSpace = 120;
 constexpr const char* kKeys =
     "give what it tells at two angles as pan_scale and tilt_scale, and these angles as "
@@ -48,14 +49,14 @@ bool is_sound(const std::optional<OnvifInterval>& declared) {
          declared->high <= kLargestEnd;
 }
 
-// A range within -1..1 is that of the generic space with stops; its angles are still those at -1
-// and 1.
+// A range within -1..1 belongs to a generic space with end stops; the user's angles are still those
+// at -1 and 1.
 bool is_wide(const std::optional<OnvifInterval>& declared) {
   return is_sound(declared) &&
          (!is_within(declared->low, kGenericScale) || !is_within(declared->high, kGenericScale));
 }
 
-// A pan that begins or ends in the middle of -1..1 may be a scale of its own.
+// A pan range that starts or ends in the middle of -1..1 may be a scale of its own.
 bool is_half(const OnvifSpaceRange& range) {
   return is_sound(range.pan) && is_sound(range.tilt) && !is_wide(range.pan) &&
          !is_wide(range.tilt) && (range.pan->low == 0 || range.pan->high == 0);
@@ -63,7 +64,8 @@ bool is_half(const OnvifSpaceRange& range) {
 
 double span(const std::optional<OnvifInterval>& declared) { return declared->high - declared->low; }
 
-// Not steps, nor per cent: a pan of half a turn to a turn over a tilt of half a turn at most.
+// Rules out steps and per cent: a pan range of half a turn to a turn, a tilt range of at most half
+// a turn.
 bool is_in_degrees(const OnvifSpaceRange& range) {
   return is_wide(range.pan) && is_wide(range.tilt) && span(range.pan) >= kLeastPan_deg &&
          span(range.pan) <= 360 && span(range.tilt) <= 180 &&
@@ -92,7 +94,7 @@ bool OnvifScale::needs_ranges(const OnvifStatus& status) const {
   return !pan_.scale && !is_degrees(status.space);
 }
 
-// That of the space itself if there is one; a generic space need not be named, nor the only one.
+// The range of this space. A generic space need not be named; nor need the only one.
 const OnvifSpaceRange* OnvifScale::declared(const std::string& space) const {
   for (const OnvifSpaceRange& range : ranges_) {
     if (range.space == space || (is_generic(range.space) && is_generic(space))) return &range;

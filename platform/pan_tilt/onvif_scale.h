@@ -1,10 +1,10 @@
 #pragma once
-// OnvifScale: from the numbers in which an ONVIF device tells its position to angles.
+// OnvifScale: converts the position values of an ONVIF device to angles.
 //
-// In order: the scale that the user states; degrees, where the space says so; the range that the
-// device declares for the space, where it reaches beyond -1..1, with the user's angles at its ends,
-// or as degrees where it can be nothing else; -1..1 with the user's angles at its ends, as the
-// standard has it. A position beyond its scale is none. Pure.
+// Rules, first match: (1) the scale that the user configured; (2) degrees, if the space says so;
+// (3) the range that the device declares for the space, if it extends beyond -1..1, with the user's
+// angles at its ends, or as degrees if it can be nothing else; (4) -1..1 with the user's angles at
+// its ends, as in the standard. A position outside its scale is an error. No side effects.
 
 #include <optional>
 #include <string>
@@ -15,35 +15,35 @@
 
 namespace alidade {
 
-// Linear map of a device's scale; swapped values turn the sign.
+// Linear map of a device's scale; swapped values reverse the direction.
 struct OnvifRange {
-  double at_low_rad = 0;   // at the low end of the scale: at -1
-  double at_high_rad = 0;  // at 1
+  double at_low_rad = 0;   // at the low end of the scale: -1
+  double at_high_rad = 0;  // at the high end: 1
 };
 
-// What the user states of an axis.
+// The user's configuration of an axis.
 struct OnvifAxis {
   std::optional<OnvifRange> angles;
-  std::optional<OnvifInterval> scale;  // what the device tells at their ends; none: see above
+  std::optional<OnvifInterval> scale;  // device units at the ends of `angles`; nullopt: rules 2 to
+                                       // 4
 };
 
 class OnvifScale {
  public:
   OnvifScale(OnvifAxis pan, OnvifAxis tilt) : pan_(pan), tilt_(tilt) {}
 
-  // Whether what the device declares matters for a position in this space.
+  // True if a position in this space needs the ranges that the device declares.
   [[nodiscard]] bool needs_ranges(const OnvifStatus& status) const;
   void set_ranges(std::vector<OnvifSpaceRange> ranges) { ranges_ = std::move(ranges); }
 
   enum class Outcome {
     kOk,
-    kOutside,     // *error: this position is none
-    kNeedsAngles  // *error: no position can be one until the user states more
+    kOutside,     // *error: this position is invalid
+    kNeedsAngles  // *error: no position is valid until the user configures more
   };
   [[nodiscard]] Outcome angles(const OnvifStatus& status, double* pan_rad, double* tilt_rad,
                                std::string* error) const;
-  // What was made of a declared range for positions in the space of this one; empty: nothing
-  // unusual.
+  // How a declared range is used for positions in the space of this one; empty: nothing unusual.
   [[nodiscard]] std::string note(const OnvifStatus& status) const;
 
  private:

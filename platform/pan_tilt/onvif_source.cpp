@@ -17,10 +17,10 @@ constexpr std::size_t kMaxOnvifBody = 256 * 1024;  // bytes; many long profiles
 constexpr std::size_t kNonceBytes = 16;
 constexpr std::size_t kShownUrl = 120;
 
-// The addresses at which a service may be, one after the other until it answers at one.
+// The candidate addresses of a service, tried one after the other until it answers.
 class ServiceSearch {
  public:
-  // Those of one that was found before are no longer sought: what fails there fails.
+  // Once the service was found, its address stays: a failure there is a failure.
   void begin(std::vector<std::string> addresses) {
     if (!found_) {
       addresses_ = std::move(addresses);
@@ -33,7 +33,7 @@ class ServiceSearch {
   void answered() { found_ = true; }
   [[nodiscard]] bool is_found() const { return found_; }
 
-  // It is not at this address. False: nor at another; *error is then what went wrong at the first.
+  // The service is not at this address. False: at no other either; *error is then the first error.
   [[nodiscard]] bool next(std::string* error) {
     if (found_) return false;
     if (error_.empty()) error_ = *error;
@@ -96,18 +96,18 @@ class OnvifConversation : public HttpConversation {
   OnvifSourceOptions options_;
   std::string user_;
   std::string password_;
-  Url device_;  // address of the device service
+  Url device_;  // URL of the device service
   std::random_device random_;
 
   Step step_ = Step::kClock;
   OnvifLoginWays login_;
-  OnvifServices services_;  // as the device tells them
+  OnvifServices services_;  // as the device reports them
   std::string services_error_;
   ServiceSearch ptz_;
   ServiceSearch media_;
   OnvifProfile profile_;
   bool ranges_asked_ = false;   // since the connection began
-  bool ranges_silent_ = false;  // asked for them the device says nothing at all
+  bool ranges_silent_ = false;  // the device does not answer at all when asked for them
   OnvifScale scale_;
   OnvifStatus status_;  // the latest
   DeviceClockTrial trial_;
@@ -208,7 +208,7 @@ HttpConversation::Outcome OnvifConversation::take(const HttpAnswer& answer, PanT
   return take_status(answer, sample, error);
 }
 
-// By HTTP digest only where the device offers it, which no wrong login is.
+// HTTP digest is used only if the device offers it, so it is never a wrong login.
 HttpConversation::Outcome OnvifConversation::not_authorized(const std::string& why,
                                                             const HttpAnswer& answer,
                                                             std::string* error) {
@@ -219,12 +219,12 @@ HttpConversation::Outcome OnvifConversation::not_authorized(const std::string& w
     *error = "the device wants a user and a password (" + why + ")";
     return Outcome::kRefused;
   }
-  // One that was good may be that of a clock that was set.
+  // An accepted login may fail later because the device's clock was set.
   *error = login_.was_good() ? "the login is refused (" + why + ")"
                              : "wrong user or password (" + why +
                                    "); ONVIF may have users of its own in the device";
   if (search != nullptr && !search->is_first() && !search->is_found()) {
-    return not_here(error);  // where nothing is, everybody may be refused
+    return not_here(error);  // where there is no service, every login may be refused
   }
   if (login_.refused(answer.offers_digest)) {
     return Outcome::kAskOn;
@@ -233,7 +233,7 @@ HttpConversation::Outcome OnvifConversation::not_authorized(const std::string& w
   return Outcome::kRefused;
 }
 
-// Nobody knows the call at this address.
+// No service at this address knows the call.
 HttpConversation::Outcome OnvifConversation::not_here(std::string* error) {
   switch (step_) {
     case Step::kCapabilities:
@@ -273,7 +273,7 @@ HttpConversation::Outcome OnvifConversation::unanswered() {
     ranges_silent_ = true;
     return go_on(Step::kStatus);
   }
-  // At a port of its own, which is not forwarded.
+  // It may be a reported port that is not forwarded.
   const std::string own = onvif_address(device_, "/");
   ServiceSearch* const search = step_ == Step::kProfile  ? &media_
                                 : step_ == Step::kStatus ? &ptz_
@@ -299,7 +299,7 @@ HttpConversation::Outcome OnvifConversation::take_services(const HttpAnswer& ans
   OnvifServices told;
   const bool names_ptz = parse_onvif_services(answer.body, &told, error);
   if (!names_ptz && !is_onvif_answer(answer.body, call()) && step_ == Step::kCapabilities) {
-    return disconnected();  // no ONVIF at all
+    return disconnected();  // not ONVIF at all
   }
   services_.media = told.media.empty() ? services_.media : told.media;
   services_.ptz = told.ptz;
@@ -310,7 +310,7 @@ HttpConversation::Outcome OnvifConversation::take_services(const HttpAnswer& ans
   return find_services();
 }
 
-// Where they may be: as they are told, if they are.
+// Candidates: the reported addresses, if any, then the usual ones.
 HttpConversation::Outcome OnvifConversation::find_services() {
   ptz_.begin(options_.ptz_path.empty()
                  ? onvif_addresses(device_, services_.ptz, OnvifService::kPtz, user_.empty())
@@ -321,7 +321,7 @@ HttpConversation::Outcome OnvifConversation::find_services() {
   return go_on(profile_.token.empty() ? Step::kProfile : Step::kStatus);
 }
 
-// Whatever is answered, the position is asked again.
+// Whatever the answer, the position is asked for again.
 HttpConversation::Outcome OnvifConversation::take_ranges(const HttpAnswer& answer) {
   std::vector<OnvifSpaceRange> ranges;
   std::string ignored;

@@ -11,7 +11,7 @@
 namespace alidade {
 namespace {
 
-// Exactly `digits` decimal digits at the front of *text, which are taken off.
+// Takes exactly `digits` decimal digits off the front of *text.
 std::optional<int> take_digits(std::string_view* text, std::size_t digits) {
   if (text->size() < digits) {
     return std::nullopt;
@@ -35,7 +35,7 @@ bool take_character(std::string_view* text, char c) {
   return true;
 }
 
-// Days from 1970-01-01 of the Gregorian calendar, by counting years from 1 March.
+// Days since 1970-01-01 in the Gregorian calendar. Years are counted from 1 March.
 std::int64_t days_from_civil(int year, int month, int day) {
   const int y = month <= 2 ? year - 1 : year;
   const int month_from_march = (month + 9) % 12;
@@ -98,7 +98,7 @@ std::optional<double> parse_xml_time(std::string_view text) {
 }
 
 std::string xml_time(double utc_s) {
-  // 0 to the year 9999.
+  // From 0 to the year 9999.
   const auto milliseconds =
       static_cast<std::int64_t>(std::llround(1e3 * std::clamp(utc_s, 0.0, 253402300799.0)));
   const std::int64_t seconds = milliseconds / 1000;

@@ -1,5 +1,5 @@
 #pragma once
-// Times as ONVIF writes them, and Unix time. Pure.
+// ONVIF time formats and Unix time. No side effects.
 
 #include <optional>
 #include <string>
@@ -18,10 +18,10 @@ struct CivilTime {
   int second = 0;
 };
 
-// None: it is no date and time from 1900 to 9999.
+// nullopt: not a valid date and time from 1900 to 9999.
 [[nodiscard]] std::optional<double> unix_time(const CivilTime& civil);
 
-// xs:dateTime and Unix time; without a zone, UTC is meant.
+// xs:dateTime to and from Unix time; without a zone it is UTC.
 [[nodiscard]] std::optional<double> parse_xml_time(std::string_view text);
 [[nodiscard]] std::string xml_time(double utc_s);
 

@@ -1,7 +1,7 @@
 #pragma once
-// PanTiltSource: one interface for every origin of pan/tilt telemetry (Axis VAPIX, ONVIF, heads on
-// serial lines, recording). Like FrameSource, a source reconnects by itself; read() blocks its own
-// thread only, stop() ends it.
+// PanTiltSource: one interface for all sources of pan/tilt telemetry (Axis VAPIX, ONVIF, heads on
+// serial lines, recordings). Like a FrameSource, it reconnects by itself. read() blocks only its
+// own thread; stop() ends it.
 
 #include <string>
 #include <vector>
@@ -22,15 +22,14 @@ class PanTiltSource {
   // Thread-safe, idempotent. Every later read() returns kStopped.
   virtual void stop() = 0;
 
-  // One line for the person; valid after kDisconnected or kFailed.
+  // One line for the user; valid after kDisconnected and kFailed.
   [[nodiscard]] virtual std::string error() const = 0;
 
-  // What the device does otherwise than its protocol says, and what is made of it: lines for the
-  // person, each said once in the source's life. Those since the last call, from the reading
-  // thread.
+  // Returns the notes since the last call, from the reading thread: how the device deviates from
+  // its protocol, and how that is handled. One line each, reported once in the source's life.
   [[nodiscard]] virtual std::vector<std::string> take_notes() { return {}; }
 
-  // URL without password, device or directory.
+  // URL without password, device path or directory.
   [[nodiscard]] virtual std::string name() const = 0;
 };
 

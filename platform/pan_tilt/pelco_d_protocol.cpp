@@ -8,7 +8,7 @@ constexpr std::uint8_t kSync = 0xFF;
 constexpr std::uint8_t kPan = 0x51;
 constexpr std::uint8_t kTilt = 0x53;
 constexpr std::uint8_t kZoom = 0x55;
-constexpr std::uint8_t kToAnswer = 0x08;  // an answer's opcode is its query's plus this
+constexpr std::uint8_t kToAnswer = 0x08;  // opcode of an answer minus that of its query
 
 std::uint8_t sum_of(std::string_view frame) {
   unsigned sum = 0;

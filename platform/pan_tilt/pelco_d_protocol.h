@@ -1,10 +1,11 @@
 #pragma once
-// Pelco-D: frames of seven bytes, FF address command1 command2 data1 data2 sum, the sum of bytes 2 to
-// 6 modulo 256. Queries 0x51 pan, 0x53 tilt, 0x55 zoom; answers 0x59, 0x5B, 0x5D with 16 bits.
+// Pelco-D: frames of seven bytes, FF address command1 command2 data1 data2 sum; the sum is that of
+// bytes 2 to 6 modulo 256. Queries 0x51 pan, 0x53 tilt, 0x55 zoom; answers 0x59, 0x5B, 0x5D with 16
+// bits.
 //   FF 01 00 51 00 00 52 -> FF 01 00 59 11 94 FF = 4500 steps
-// Any byte can be FF, the sum included: a frame is known by its length, address, opcode and sum, never
-// by FF alone. Pan 0..35999 steps of 0.01 degree; tilt 0 at the horizon, 9000 straight down, 33000
-// thirty degrees up. There is no negative answer: a query that is not known gets none.
+// Any byte can be FF, including the sum. So a frame is recognised by length, address, opcode and
+// sum, never by FF alone. Pan is 0..35999 steps of 0.01 degree. Tilt is 0 at the horizon, 9000
+// straight down, 33000 thirty degrees up. There is no negative answer: an unknown query gets none.
 
 #include <cstdint>
 #include <optional>
@@ -27,7 +28,8 @@ struct PelcoDAnswer {
 
 [[nodiscard]] std::string pelco_d_query(int address, std::uint8_t opcode);
 
-// The latest whole answer with this address and opcode; *problem says what came instead, if anything.
+// The latest complete answer with this address and opcode. *problem says what came instead, if
+// anything.
 [[nodiscard]] std::optional<PelcoDAnswer> find_pelco_d_answer(std::string_view bytes, int address,
                                                               std::uint8_t opcode,
                                                               std::string* problem);
@@ -41,14 +43,14 @@ class PelcoDProtocol : public QueryProtocol {
   [[nodiscard]] Query next() override;
   [[nodiscard]] Answer find(std::string_view bytes) override;
   [[nodiscard]] std::string give_up() override { return {}; }
-  void doubt() override {}  // an answer names its axis
+  void doubt() override {}  // not needed: an answer names its axis
   [[nodiscard]] bool is_of_datagrams() const override { return false; }
   [[nodiscard]] int polls_per_reading() const override { return 2; }
   [[nodiscard]] int bytes_per_reading() const override { return 28; }
 
  private:
   PelcoDOptions options_;
-  int turn_ = 0;  // of pan, tilt, pan, tilt, ... zoom
+  int turn_ = 0;  // position in the sequence pan, tilt, pan, tilt, ... zoom
   Answer::Kind asked_ = Answer::Kind::kNone;
 };
 

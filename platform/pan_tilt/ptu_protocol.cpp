@@ -12,12 +12,12 @@ namespace {
 
 constexpr std::string_view kEndOfLine = "\r\n";
 constexpr std::size_t kLongestLine = 80;  // bytes
-constexpr double kMaxSteps = 1e7;         // more than any resolution has in a turn
+constexpr double kMaxSteps = 1e7;         // more than any resolution has per turn
 constexpr double kDegPerArcSecond = 1.0 / 3600;
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
-// A line without its end. None: no line of a PTU.
+// line: without its line end. nullopt: not an answer of a PTU.
 std::optional<PtuLine> parse_line(std::string_view line) {
   const std::size_t sign = line.find_last_of("*!");
   if (sign == std::string_view::npos) {
@@ -47,7 +47,7 @@ std::optional<PtuLine> parse_line(std::string_view line) {
   while (end < rest.size() && (is_digit(rest[end]) || rest[end] == '.')) {
     ++end;
   }
-  // A unit may follow, after a space; anything else is damage.
+  // A unit may follow after a space; anything else is damage.
   if (end < rest.size() && rest[end] != ' ') {
     return std::nullopt;
   }
@@ -98,7 +98,7 @@ void PtuProtocol::advance() {
     case Asked::kImmediate:
     case Asked::kPanStep:
     case Asked::kTiltStep:
-      // One answer could be damaged and would scale all that follow: two alike are needed.
+      // A damaged answer would scale all later readings, so two equal answers are needed.
       asked_ = pan_deg_per_step_ <= 0    ? Asked::kPanStep
                : tilt_deg_per_step_ <= 0 ? Asked::kTiltStep
                                          : Asked::kPan;
@@ -183,7 +183,7 @@ Answer PtuProtocol::find(std::string_view bytes) {
   }
   answer.begin = line->begin;
   if (line->kind == PtuLine::Kind::kError) {
-    // Limits are reported without being asked ("!P", "!T"): they answer nothing.
+    // Limits are reported unasked ("!P", "!T") and answer no query.
     if (line->words.size() > 2) {
       answer.kind = asked_ == Asked::kFence ? Answer::Kind::kDone : Answer::Kind::kRefused;
     }

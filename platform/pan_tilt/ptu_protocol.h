@@ -1,15 +1,11 @@
 #pragma once
 // FLIR (Directed Perception) PTU: ASCII commands that end with a space, answers of one line.
-//   PP  -> "* Current Pan position is 1000", terse (after FT) "* 1000";  TP  the tilt
-//   PR  -> "* 185.1428 seconds arc per position";  TR  the tilt's;  errors "! text"
-// After a connection: FT or FV (terse or verbose), ED (no echo), CI (answers at once), then PR and TR
-// unless the configuration states the degrees per step, then PP and TP in turn.
-//
-// Answer N need not belong to query N. A verbose answer names its axis and must name the one asked. A
-// terse one does not, nor does that to PR and TR. After a query without answer a space ends what the device
-// may have half received; then CI (whose answer has no number) is asked as a fence (see query_protocol.h),
-// or PP where the query was such a command, and the other axis is next. CI also stands between the
-// resolutions and what follows them. A digit lost on the way is not noticed.
+//   PP  -> "* Current Pan position is 1000", terse (after FT) "* 1000";  TP for tilt
+//   PR  -> "* 185.1428 seconds arc per position";  TR for tilt;  errors "! text"
+// On connection: FT or FV (terse or verbose), ED (no echo), CI (answers at once), then PR and TR
+// unless the degrees per step are configured, then PP and TP in turn. A verbose answer names its
+// axis, which must be the one asked; a terse one does not, nor does an answer to PR and TR. Fences
+// (query_protocol.h): docs/derivations.md. A lost digit is not noticed.
 
 #include <optional>
 
@@ -19,7 +15,7 @@ namespace alidade {
 
 struct PtuOptions {
   bool verbose = true;
-  std::optional<double> pan_deg_per_step;  // else the device is asked
+  std::optional<double> pan_deg_per_step;  // nullopt: the device is asked
   std::optional<double> tilt_deg_per_step;
 };
 
@@ -27,12 +23,12 @@ struct PtuLine {
   enum class Kind { kOk, kNumber, kError };
   Kind kind = Kind::kOk;
   double number = 0;
-  std::string words;      // before the number, in lower case; of an error: its text
-  std::size_t begin = 0;  // of the '*' or '!'
+  std::string words;      // before the number, in lower case; the text of an error
+  std::size_t begin = 0;  // index of the '*' or '!'
 };
 
-// The latest whole line of the device with a '*' or '!' in it. What stands before the sign (noise, an
-// echo, half a line) is passed over; words after a number (the unit) too.
+// The latest complete line with a '*' or '!'. Anything before the sign (noise, an echo, a partial
+// line) is skipped, as are words after a number (the unit).
 [[nodiscard]] std::optional<PtuLine> find_ptu_line(std::string_view bytes);
 
 class PtuProtocol : public QueryProtocol {
@@ -47,7 +43,7 @@ class PtuProtocol : public QueryProtocol {
   void doubt() override;
   [[nodiscard]] bool is_of_datagrams() const override { return false; }
   [[nodiscard]] int polls_per_reading() const override { return 2; }
-  // "PP " and "* -12345\r\n", or "* Current Pan position is -12345\r\n", and the tilt's.
+  // "PP " and "* -12345\r\n", or "* Current Pan position is -12345\r\n", and the same for tilt.
   [[nodiscard]] int bytes_per_reading() const override { return options_.verbose ? 75 : 26; }
 
  private:
@@ -58,12 +54,12 @@ class PtuProtocol : public QueryProtocol {
 
   PtuOptions options_;
   Asked asked_ = Asked::kFeedback;
-  bool begun_ = false;  // a query of this connection has been sent
+  bool begun_ = false;  // a query was sent on this connection
   bool fence_next_ = false;
   bool fence_is_number_ = false;
-  int since_fence_ = 0;                    // queries
-  Asked behind_fence_ = Asked::kFeedback;  // asked before it
-  double step_heard_ = 0;                  // arc seconds, in the latest answer about it
+  int since_fence_ = 0;                    // queries since the last fence
+  Asked behind_fence_ = Asked::kFeedback;  // asked before the fence
+  double step_heard_ = 0;                  // arc seconds; in the latest answer to PR or TR
   double pan_deg_per_step_ = 0;
   double tilt_deg_per_step_ = 0;
 };

@@ -9,10 +9,10 @@
 namespace alidade {
 namespace {
 
-constexpr double kQuietBytes = 10;  // times of a byte without one are silence
+constexpr double kQuietBytes = 10;  // byte times without a byte count as silence
 constexpr double kLeastQuiet_s = 0.02;
 constexpr int kTriesPerTimeout = 4;
-constexpr double kWireTimes = 2;  // of query and answer, for a head that answers
+constexpr double kWireTimes = 2;  // times of query and answer on the wire, for an answer
 constexpr double kLeastAnswer_s = 0.05;
 constexpr double kLeastLatest_s = 1;
 constexpr int kGivenUpOfALostHead = 3;
@@ -115,8 +115,8 @@ void QuerySource::settle(double now_s) {
   }
 }
 
-// Bytes came that nobody asked for. Those behind a fence that a doubt asked for are younger than all before it and raise
-// no other: where each answer comes twice, fence would follow upon fence.
+// Unrequested bytes came. Bytes behind a fence that a doubt caused are younger than everything
+// before it and cause no further fence: with duplicated answers, fence would follow fence.
 void QuerySource::doubt(double now_s) {
   const bool behind_fence = fenced_ && asked_ == 1;
   if (!behind_fence) protocol_->doubt();
@@ -125,7 +125,7 @@ void QuerySource::doubt(double now_s) {
 }
 
 ReadStatus QuerySource::ask(double now_s) {
-  // What is still in the buffers came before the query and is no answer to it.
+  // Bytes still in the buffers came before the query and do not answer it.
   std::string stale;
   LinkStatus status = link_.receive(&stale, 0);
   const bool surplus = status == LinkStatus::kOk;
@@ -198,7 +198,7 @@ std::string QuerySource::what_came() const {
                          : "; check power, wiring, address and baud or port");
 }
 
-// The line should fall silent; or the answer to a query that was given up comes after all.
+// Waits for the line to fall silent, or for the answer to a query that was given up.
 void QuerySource::listen(const std::string& bytes, double now_s) {
   if (late_awaited_ && find(bytes, now_s).kind != Answer::Kind::kNone) {
     late_awaited_ = false;
@@ -210,7 +210,7 @@ void QuerySource::listen(const std::string& bytes, double now_s) {
   }
 }
 
-// Among all bytes since the query.
+// Searches all bytes since the query.
 Answer QuerySource::find(const std::string& bytes, double now_s) {
   if (link_.is_datagram() && protocol_->is_of_datagrams()) {
     received_.clear();
@@ -233,7 +233,7 @@ Answer QuerySource::find(const std::string& bytes, double now_s) {
   return answer;
 }
 
-// True: *sample is filled.
+// Returns true if *sample is filled.
 bool QuerySource::take_bytes(const std::string& bytes, double now_s, PanTiltSample* sample) {
   if (state_ == State::kSettling || (state_ == State::kIdle && late_awaited_)) {
     listen(bytes, now_s);
@@ -337,7 +337,8 @@ ReadStatus QuerySource::read(PanTiltSample& sample, double timeout_s) {
           late_awaited_ = false;
           fenced_ = false;
           first_is_old_ = open_ > 0;
-          open_ = open_ > 0 ? 2 : 0;  // what was asked before is answered on a new connection, too
+          open_ = open_ > 0 ? 2 : 0;  // answers to earlier queries may come on the new connection,
+                                      // too
           due_s_ = now_s;
           settle(now_s);
         } else if (take_bytes(bytes, now_s, &sample)) {

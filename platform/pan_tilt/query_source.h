@@ -1,23 +1,13 @@
 #pragma once
-// QuerySource: a head that is asked for its position, by any QueryProtocol over any ByteLink.
-//
-// Polls lie on a grid of rate_hz, or of what a serial line can carry if that is less. One query is under
-// way at a time: an answer later than that shifts the grid, for a head that cannot keep up is asked as
-// often as it answers. What an answer tells was true between the sending of the query and the answer's
-// first byte. A query without answer is given up after a quarter of timeout_s, or twice what query and
-// answer take on the wire and 50 ms if that is longer. Its answer may still come, and must not be taken for
-// that of a later query: the protocol asks next what is answered differently, and an answer to that shows
-// that nothing older is under way, for heads answer in order. If it is not answered either, the source
-// listens until four times that time, at least 1 s, has passed since the first of the two was sent: an
-// answer later than that can be taken for another's. A converter that stood still for longer hands such a one to the
-// next connection: where queries were open at the end of the one before, the first answer is thrown away, and those
-// that come behind it as they find no query. Protocols that give one axis at a time yield a sample
-// for each tilt, with the pan of the same moment (AxisPairing). Signs and zeros turn what the device counts
-// into the axes of the model, in [-pi, pi).
-//
-// kDisconnected: no link, or no sample within timeout_s and three queries given up; error() says what
-// came instead. The link is then closed and opened again after a growing pause. kFailed: an address or a
-// device that can never work. read() talks on the calling thread; it allocates.
+// QuerySource: polls a head for its position, by any QueryProtocol over any ByteLink. Polls lie on
+// a grid of rate_hz, or slower if the serial line cannot carry that. One query is outstanding at a
+// time; an answer later than the next grid point shifts the grid. A sample was true between the
+// sending of the query and the first byte of its answer. Protocols that report one axis at a time
+// give a sample per tilt, with the pan of the same moment (AxisPairing). Angles are mapped by sign
+// and zero to the model's axes, in [-pi, pi). Late answers: docs/derivations.md.
+// kDisconnected: no link, or no sample within timeout_s and three queries given up; error() says
+// what came instead. The link is then reopened after a growing pause. kFailed: an address or a
+// device that can never work. read() does the I/O on the calling thread; it allocates.
 
 #include <atomic>
 #include <memory>
@@ -40,8 +30,8 @@ struct QuerySourceOptions {
   AxisMapping pan;
   AxisMapping tilt;
   double rate_hz = 30;
-  double timeout_s = 1;      // without a sample: the head is lost
-  double max_backoff_s = 5;  // longest pause between two tries
+  double timeout_s = 1;      // without a sample for so long, the head is lost
+  double max_backoff_s = 5;  // longest pause between two attempts
 };
 
 class QuerySource : public PanTiltSource {
@@ -58,13 +48,13 @@ class QuerySource : public PanTiltSource {
   enum class State {
     kClosed,    // until due_s_
     kOpening,   // until until_s_
-    kSettling,  // listens: until until_s_, or until quiet_s_ if that is earlier
+    kSettling,  // listens: until the earlier of until_s_ and quiet_s_
     kIdle,      // until due_s_
     kAsked      // until until_s_
   };
 
   [[nodiscard]] double next_event_s() const;
-  ReadStatus act(double now_s);  // the event's time has come
+  ReadStatus act(double now_s);  // handles the event that is due
   ReadStatus ask(double now_s);
   ReadStatus give_up(double now_s);
   void settle(double now_s);
@@ -83,36 +73,37 @@ class QuerySource : public PanTiltSource {
   ByteLink link_;
   double poll_period_s_ = 0;
   double quiet_time_s_ = 0;
-  double answer_time_s_ = 0;  // a query without an answer for so long is given up
-  double latest_time_s_ = 0;  // no answer comes so long after its query
+  double answer_time_s_ = 0;  // after this time a query is given up
+  double latest_time_s_ = 0;  // after this time no answer to a query is expected
   Backoff backoff_;
   std::string error_;
   bool failed_ = false;
   std::atomic<bool> stopped_{false};
 
   State state_ = State::kClosed;
-  int asked_ = 0;     // queries since the line was silent
-  double due_s_ = 0;  // of the next try or the next poll
+  int asked_ = 0;     // queries since the line was last silent
+  double due_s_ = 0;  // time of the next attempt or poll
   double until_s_ = 0;
   double quiet_s_ = 0;
-  int given_up_ = 0;            // queries since the latest sample
-  double failing_since_s_ = 0;  // when the first of them was sent
+  int given_up_ = 0;            // queries given up since the latest sample
+  double failing_since_s_ = 0;  // when the first of these was sent
   bool some_answered_ = false;  // since then
-  int open_ = 0;                // queries in a row without answers, which may still come
-  double open_since_s_ = 0;     // when the first of them was sent
-  bool refused_ = false;        // the latest query, by an answer
-  bool fenced_ = false;         // a doubt was told to the protocol, whose next query is a fence
-  bool first_is_old_ = false;   // the next answer may be that of a query of the connection before
-  bool late_awaited_ = false;   // the answer to the latest query, which was given up
-  double late_s_ = 0;           // how long an answer took that was given up; 0: none did
+  int open_ = 0;                // consecutive unanswered queries; their answers may still come
+  double open_since_s_ = 0;     // when the first of these was sent
+  bool refused_ = false;        // the latest query was refused by an answer
+  bool fenced_ = false;         // protocol_->doubt() was called; its next query is a fence
+  bool first_is_old_ = false;   // the next answer may belong to a query of the previous connection
+  bool late_awaited_ = false;   // the latest query was given up, and its answer may still come
+  double late_s_ = 0;           // delay of an answer that came after its query was given up; 0:
+                                // none
   bool restarted_ = true;
-  std::string problem_;  // what came instead of a reading, lately
+  std::string problem_;  // what came lately instead of a reading
   SourceNotes notes_;
 
-  // The query under way.
+  // The outstanding query.
   double sent_s_ = 0;
   std::string received_;
-  std::vector<double> arrivals_s_;  // of each byte
+  std::vector<double> arrivals_s_;  // of each byte of received_
 
   AxisPairing pairing_;
   std::optional<double> zoom_;

@@ -1,7 +1,7 @@
 #pragma once
 // open_recorded_pan_tilt(): the telemetry.csv of a recording (recording.h), at full speed or at the
-// pace of its receive times. Without column earliest_time_s, a sample's interval is its receive
-// time alone.
+// pace of its receive times. Without a column earliest_time_s, a sample's interval is just its
+// receive time.
 
 #include <memory>
 #include <string>
@@ -12,7 +12,8 @@ namespace alidade {
 
 struct RecordingPanTiltSourceOptions {
   std::string directory;
-  // Pace: the recording's first stamp (of frames and telemetry) is due at the first read().
+  // True: keeps the pace; the recording's first stamp (of frames and telemetry) is due at the first
+  // read().
   bool realtime = false;
 };
 

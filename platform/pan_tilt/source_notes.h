@@ -1,5 +1,5 @@
 #pragma once
-// SourceNotes: what a source has to say of its device, each line once (PanTiltSource::take_notes).
+// SourceNotes: collects a source's notes on its device, each once (PanTiltSource::take_notes).
 
 #include <algorithm>
 #include <string>
@@ -10,7 +10,7 @@ namespace alidade {
 
 class SourceNotes {
  public:
-  // of: the source's name. An empty note is none.
+  // of: the source's name. Empty notes are ignored.
   void add(const std::string& of, const std::string& note) {
     if (note.empty() || std::find(said_.begin(), said_.end(), note) != said_.end()) return;
     said_.push_back(note);

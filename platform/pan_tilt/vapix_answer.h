@@ -1,7 +1,7 @@
 #pragma once
 // The answer of an Axis camera to query=position, lines of key=value in degrees:
 //   pan=51.2891\r\ntilt=46.1914\r\nzoom=1234\r\n...
-// or "Error:..." (with HTTP status 200). Pure: bytes in, value or error out.
+// or "Error:..." (with HTTP status 200). No side effects: bytes in, value or error out.
 
 #include <optional>
 #include <string>
@@ -15,7 +15,7 @@ struct VapixPosition {
   std::optional<double> zoom;  // device units
 };
 
-// False: *error is one line. Unknown keys are ignored; pan and tilt must be there, each finite and
+// False: *error is one line. Unknown keys are ignored. pan and tilt are required, each finite and
 // within a turn.
 [[nodiscard]] bool parse_vapix_position(std::string_view body, VapixPosition* position,
                                         std::string* error);

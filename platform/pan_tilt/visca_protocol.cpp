@@ -8,7 +8,7 @@ namespace {
 
 constexpr char kEnd = '\xFF';
 constexpr std::size_t kHeader = 8;    // bytes
-constexpr std::size_t kLongest = 12;  // bytes of a frame without its end
+constexpr std::size_t kLongest = 12;  // bytes of a frame without its FF
 constexpr std::uint16_t kInquiry = 0x0110;
 constexpr std::uint16_t kControl = 0x0200;
 constexpr std::uint16_t kControlReply = 0x0201;
@@ -38,7 +38,7 @@ std::string with_header(std::uint16_t type, std::uint32_t sequence, const std::s
   return bytes + payload;
 }
 
-// None if one of the bytes is more than a nibble.
+// nullopt if one of the bytes is more than a nibble.
 std::optional<unsigned> nibbles(std::string_view bytes) {
   unsigned value = 0;
   for (std::size_t i = 0; i < bytes.size(); ++i) {
@@ -59,7 +59,7 @@ std::optional<int> signed_nibbles(std::string_view bytes) {
   return static_cast<int>(*value & (sign - 1)) - static_cast<int>(*value & sign);
 }
 
-// A frame without its end.
+// frame: without its FF.
 std::optional<ViscaFrame> parse_frame(std::string_view frame, int address) {
   if (frame.size() < 3 || byte_at(frame, 0) != 0x80U + 16U * static_cast<unsigned>(address)) {
     return std::nullopt;
@@ -110,7 +110,7 @@ std::optional<ViscaFrame> find_visca_frame(std::string_view bytes, int address) 
   std::size_t begin = 0;
   for (std::size_t end = bytes.find(kEnd); end != std::string_view::npos;
        end = bytes.find(kEnd, begin)) {
-    // Noise may stand before the frame.
+    // Noise may come before the frame.
     for (std::size_t i = std::max(begin, end - std::min(end, kLongest)); i < end; ++i) {
       if (std::optional<ViscaFrame> frame = parse_frame(bytes.substr(i, end - i), address)) {
         frame->begin = i;
@@ -146,7 +146,7 @@ void ViscaProtocol::restart() {
   sequence_ = 0;
   answered_ = false;
   other_number_ = false;
-  fence_next_ = needs_fences();  // a line keeps what another program asked
+  fence_next_ = needs_fences();  // the line may still hold what another program asked
   since_fence_ = 0;
   turn_ = 0;
   heard_length_ = 0;
@@ -184,7 +184,7 @@ Query ViscaProtocol::next() {
 
 std::string ViscaProtocol::give_up() {
   if (asked_ == Asked::kNumbering) {
-    numbered_ = true;  // a device that does not answer control datagrams is asked all the same
+    numbered_ = true;  // a device that does not answer control datagrams is queried all the same
   } else if (!numbers_count_ && !answered_) {
     number_stands_ = !number_stands_;
   }
@@ -240,10 +240,10 @@ Answer ViscaProtocol::find_in_datagram(std::string_view bytes) {
   if (!header && !bytes.empty()) {
     answer.problem = kNoHeader;
   }
-  // Whatever its type: some devices answer with an inquiry's.
+  // Of any type: some devices answer with an inquiry's.
   const bool is_its_own = header && header->sequence == sequence_;
   if (is_its_own && !frame) {
-    answer = find_in_payload(header->payload);  // says that it is none
+    answer = find_in_payload(header->payload);  // reports that it is not an answer
   }
   if (asked_ == Asked::kNumbering || !frame || !fits(*frame)) {
     return answer;
@@ -251,8 +251,8 @@ Answer ViscaProtocol::find_in_datagram(std::string_view bytes) {
   answered_ = true;
   if (is_its_own) {
     other_number_ = false;
-    // A number that stands still proves nothing, nor does a first one, which is what many of them
-    // always say.
+    // A constant number proves nothing. Nor does a first one (1), which many of these devices
+    // always send.
     numbers_count_ =
         numbers_count_ || (asked_ == Asked::kFence && !number_stands_ && sequence_ > 1);
   } else {
@@ -267,13 +267,13 @@ Answer ViscaProtocol::find_in_datagram(std::string_view bytes) {
     }
   }
   answer = find_in_payload(header ? header->payload : bytes);
-  // What refuses and answers without a header most likely does not know it.
+  // A device that refuses, without a header, most likely does not know the header.
   if (!header && answer.kind == Answer::Kind::kRefused) answer.problem = kNoHeader;
   answer.begin = 0;
   return answer;
 }
 
-// An answer to what was asked, by its length.
+// Whether the frame's kind answers the latest query.
 bool ViscaProtocol::fits(const ViscaFrame& frame) const {
   return frame.kind == ViscaFrame::Kind::kError ||
          (frame.kind == ViscaFrame::Kind::kPosition) == (asked_ == Asked::kPosition);
@@ -291,7 +291,8 @@ Answer ViscaProtocol::find_in_payload(std::string_view bytes) {
   }
   answer.begin = frame->begin;
   if (frame->kind == ViscaFrame::Kind::kError) {
-    // A fence has done its work also where the device does not know the zoom.
+    // An error also completes a fence: the device does not know the zoom, but older answers are
+    // out.
     answer.kind = asked_ == Asked::kFence ? Answer::Kind::kDone : Answer::Kind::kRefused;
     char code[8];
     std::snprintf(code, sizeof code, "%02X", static_cast<unsigned>(frame->error));

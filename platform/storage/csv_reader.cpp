@@ -22,8 +22,8 @@ constexpr std::string_view kSpaces = " \t";
 
 constexpr std::size_t kLongestCsvLine = 65536;  // bytes
 
-// The line without its line feed. False at the end of the text; *cut_off: the last line has no line feed. Of one that is too long
-// the beginning, longer than kLongestCsvLine.
+// Reads a line without its line feed. False at the end of the text. *cut_off: the last line has no
+// line feed. Of a line that is too long, only the start is read, longer than kLongestCsvLine.
 bool next_line(std::istream& text, std::string* line, bool* cut_off) {
   line->clear();
   for (char piece[4096]; line->size() <= kLongestCsvLine;) {
@@ -54,7 +54,7 @@ void split(std::string_view line, std::vector<std::string_view>* cells) {
   }
 }
 
-// "" if the text is what the column holds, else what is wrong. `buffer`: memory to use again.
+// Empty if the text is valid for the column, else what is wrong. `buffer` is memory for reuse.
 std::string parse_cell(const CsvColumn& column, std::string_view text, std::string* buffer,
                        std::optional<double>* value) {
   value->reset();
@@ -73,8 +73,8 @@ std::string parse_cell(const CsvColumn& column, std::string_view text, std::stri
   return {};
 }
 
-// Finds each of the table's columns in its first line: *places, none for one that is missing. "" or what
-// is wrong.
+// Finds the table's columns in its first line. *places is nullopt for a missing one. Returns "" or
+// what is wrong.
 std::string find_columns(const std::vector<CsvColumn>& columns,
                          const std::vector<std::string_view>& names,
                          std::vector<std::optional<std::size_t>>* places) {

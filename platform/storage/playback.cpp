@@ -12,7 +12,7 @@
 namespace alidade {
 namespace {
 
-// A table that cannot be read has no say; the source that needs it reports it.
+// A table that cannot be read is ignored here; the source that needs it reports the error.
 double first_receive_time_s(const std::string& directory) {
   double first_s = std::numeric_limits<double>::infinity();
   std::string error;

@@ -1,7 +1,7 @@
 #pragma once
-// Playback: lets the items of a recording out at full speed or at the pace of their receive times, for
-// the two recording sources. Each source has its own; both take the recording's first stamp as zero,
-// so that frames and telemetry keep their order when their threads begin together.
+// Playback: releases the items of a recording at full speed or at the pace of their receive times.
+// Each of the two recording sources has its own. Both take the recording's first stamp as time 0,
+// so that frames and telemetry keep their order when their threads start together.
 
 #include <condition_variable>
 #include <mutex>
@@ -16,8 +16,8 @@ class Playback {
  public:
   Playback(std::string directory, bool realtime);
 
-  // Waits at most timeout_s until an item of this receive time is due: kOk, kTimeout or kStopped.
-  // The first call starts the clock.
+  // Waits until an item with this receive time is due, at most timeout_s. Returns kOk, kTimeout or
+  // kStopped. The first call starts the clock.
   [[nodiscard]] ReadStatus wait_until_due(double receive_time_s, double timeout_s);
 
   // Thread-safe.

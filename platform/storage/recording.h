@@ -5,11 +5,11 @@
 //   telemetry.csv    receive_time_s,pan_rad,tilt_rad[,zoom][,device_time_s][,sequence]
 //                    [,earliest_time_s][,restarted]
 //   tracks.csv       frame,landmark,u_px,v_px,sigma_px   (in place of, or beside, the video)
-// Times are seconds of one clock (of the recording host), angles radians. A cell of an optional
-// column may be empty: not known. Unknown columns are ignored. Every line ends with a newline, so
-// that a file which was cut off in the middle of a number does not pass for a whole one.
-// Stamps are passed on as they are: equal or jumping ones are the clock filter's business.
-// On failure the functions return false and *error is one line: what, file:line, what is right. parse_...()
+// Times are seconds of one clock (the recording host's), angles are radians. A cell of an optional
+// column may be empty: the value is unknown. Unknown columns are ignored. Every line ends with a
+// newline, so that a file cut off in the middle of a number is not taken for a complete one. Stamps
+// are passed on unchecked: the clock filter handles equal or jumping ones. On failure the functions
+// return false and *error is one line: what is wrong, file:line, what would be right. parse_...()
 // take the text itself; name stands for the file in errors.
 
 #include <cstdint>
@@ -28,7 +28,7 @@ struct RecordingInfo {
   std::string notes;
 };
 
-// A landmark as one frame saw it; u right, v down, the centre of the top-left pixel at (0.5, 0.5).
+// A landmark as seen in one frame; u right, v down, centre of the top-left pixel (0.5, 0.5).
 struct TrackPoint {
   std::int64_t frame = 0;
   std::int64_t landmark = 0;
@@ -52,10 +52,10 @@ struct TrackPoint {
 [[nodiscard]] bool read_telemetry_csv(const std::string& directory,
                                       std::vector<PanTiltSample>* samples, std::string* error);
 
-// Points are passed on as they are: doubled or contradicting ones are the calibration's business.
+// Points are passed on unchecked: the calibration handles duplicates and contradictions.
 [[nodiscard]] bool parse_tracks_csv(std::istream& text, const std::string& name,
                                     std::vector<TrackPoint>* points, std::string* error);
-// The columns that they read, separated by commas: the first line of what writes tracks.csv.
+// The columns of tracks.csv, separated by commas: the first line of such a file.
 [[nodiscard]] std::string tracks_csv_columns();
 [[nodiscard]] bool read_tracks_csv(const std::string& directory, std::vector<TrackPoint>* points,
                                    std::string* error);

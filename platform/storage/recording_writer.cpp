@@ -50,7 +50,7 @@ bool RecordingWriter::append(const Table& table, const std::string& line, std::s
     return true;
   }
   *error = failure(table.path, errno);
-  // No half row stays behind.
+  // Removes a partial row.
   if (before >= 0 && ::ftruncate(table.file.get(), before) == 0) {
     ::lseek(table.file.get(), before, SEEK_SET);
   }

@@ -1,8 +1,8 @@
 #pragma once
-// RecordingWriter: writes the tables that recording.h reads. Each row goes to the file at once and
-// whole: after a kill, or when the disk is full, the files hold every row that was reported as
-// written and no half row. Numbers keep all their digits.
-// add_frame() and add_telemetry() may be called by two different threads; neither by several.
+// RecordingWriter: writes the tables that recording.h reads. Each row is written to the file at
+// once and as a whole: after a kill or a full disk, the files hold every row that was reported as
+// written and no partial row. Numbers keep all their digits. add_frame() and add_telemetry() may be
+// called from two different threads, but each from one thread only.
 
 #include <string>
 
@@ -14,15 +14,14 @@ namespace alidade {
 
 class RecordingWriter {
  public:
-  // Makes the directory if need be; refuses one that already holds a recording's tables.
+  // Creates the directory if needed. Refuses one that already holds a recording's tables.
   [[nodiscard]] bool open(const std::string& directory, int width, int height,
                           const std::string& notes, std::string* error);
 
   [[nodiscard]] bool add_frame(const FrameStamp& stamp, std::string* error);
   [[nodiscard]] bool add_telemetry(const PanTiltSample& sample, std::string* error);
 
-  // Asks the system to bring everything to the disk itself (rows already survive a kill without
-  // it).
+  // Asks the system to sync the files to the disk. Rows survive a kill of the process without it.
   [[nodiscard]] bool flush(std::string* error);
 
  private:

@@ -1,5 +1,5 @@
 #pragma once
-// What flows from every video link. Times are seconds of the host's CLOCK_MONOTONIC, taken when the frame
+// Frames of any video source. Times are seconds of the host's CLOCK_MONOTONIC, taken when the frame
 // arrived, never after decoding.
 
 #include <cstddef>
@@ -9,30 +9,29 @@
 
 namespace alidade {
 
-// What a person is told of interlaced frames.
+// The message to the user about interlaced video.
 inline constexpr const char* kInterlaced =
     "the video is interlaced: every other row is of another moment, half a frame apart, which no "
     "camera model here knows; set "
     "the camera to progressive";
 
-// What the receive time of a frame is.
+// What a frame's receive time refers to.
 enum class StampedAt : std::uint8_t {
-  kArrival,        // here; the frame may have waited before
-  kExposureStart,  // by the driver, when the sensor took it: wherever it waited since, it is of then
-  kFrameEnd        // by the driver, when all of it was read out
+  kArrival,        // arrival at this host; the frame may have waited on its way
+  kExposureStart,  // stamped by the driver at the start of exposure; later waiting does not matter
+  kFrameEnd        // stamped by the driver when the whole frame was read out
 };
 
-// When and in which order a frame came. Fixed size: crosses queues by value.
+// When and in which order a frame came. Fixed size; crosses queues by value.
 struct FrameStamp {
-  std::int64_t frame = 0;  // 0, 1, 2, ... of the frames this source delivered
-  // host CLOCK_MONOTONIC at the arrival of the frame's last packet (of its first byte, or as the driver
-  // stamped it, where the source says so)
+  std::int64_t frame = 0;  // 0, 1, 2, ...: count of the frames that this source delivered
+  // s, host CLOCK_MONOTONIC; arrival of the frame's last packet. A source that stamps its first
+  // byte or takes the driver's stamp says so.
   double receive_time_s = 0;
-  std::optional<double> sender_time_s;   // capture time on the sender's clock, unwrapped, any epoch
-  std::optional<double> sender_utc_s;    // the same as Unix time, once RTCP or the like has told it
-  std::optional<std::int64_t> sequence;  // sender's count of frames, unwrapped; a gap is a loss
-  bool restarted =
-      false;  // first frame after a (re)connection: sender clock and sequence begin anew
+  std::optional<double> sender_time_s;   // capture, by the sender's clock; unwrapped, any epoch
+  std::optional<double> sender_utc_s;    // the same as Unix time, once RTCP or the like gives it
+  std::optional<std::int64_t> sequence;  // the sender's frame count, unwrapped; a gap is a loss
+  bool restarted = false;  // first after a (re)connection: sender clock and sequence start anew
   StampedAt stamped_at = StampedAt::kArrival;
 };
 
@@ -41,14 +40,14 @@ struct Frame {
   FrameStamp stamp;
   int width = 0;   // px
   int height = 0;  // px
-  // 8-bit luma, row v starts at luma + v * stride; null if the source was told not to decode, and while it cannot: what the
-  // picture is coded from was lost, up to the next key frame.
+  // 8-bit luma; row v starts at luma + v * stride. Null if the source was told not to decode, and
+  // while it cannot: reference data was lost and the next key frame has not come.
   const std::uint8_t* luma = nullptr;
   std::ptrdiff_t stride = 0;          // bytes
   std::shared_ptr<const void> owner;  // keeps luma alive
   bool interlaced = false;  // coded as two fields: every other row may be of another moment
-  // What read() took to make luma of the data, waiting and queueing not included; none: not decoded,
-  // or not told.
+  // s; time that read() took to decode luma, without waiting and queueing. nullopt: not decoded, or
+  // not measured.
   std::optional<double> decode_s;
 };
 

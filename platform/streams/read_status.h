@@ -2,15 +2,15 @@
 
 namespace alidade {
 
-// What one read() of a source of frames or telemetry came to.
+// The result of one read() of a source of frames or telemetry.
 enum class ReadStatus {
   kOk,            // the item is valid
-  kTimeout,       // nothing came within the time given; the connection is believed good
+  kTimeout,       // nothing came within the given time; the connection is believed good
   kDisconnected,  // connection lost or refused; the next read() tries again; see error()
-  kEnd,           // a recording is over
+  kEnd,           // the recording has ended
   kStopped,       // stop() was called
-  // Will never work (no such file, wrong password, unknown codec); see error(). What a camera answers counts so
-  // only until its first item: later it is kDisconnected.
+  // Will never work (no such file, wrong password, unknown codec); see error(). A camera's answer
+  // counts as this only before its first item; later it is kDisconnected.
   kFailed
 };
 

@@ -50,13 +50,13 @@ speed_t speed_code(int baud) {
   return B0;
 }
 
-// The system's word for an error number.
+// The system's text for an error number.
 std::string reason(int error) {
   char buffer[128];
   return ::strerror_r(error, buffer, sizeof buffer);
 }
 
-// The same of a serial line, which answers so once its plug is pulled.
+// The same for a serial line, which gives EIO or ENXIO once its plug is pulled.
 std::string line_reason(int error) {
   return error == EIO || error == ENXIO ? "the line is gone: unplugged?" : reason(error);
 }
@@ -146,7 +146,7 @@ LinkStatus ByteLink::open() {
 LinkStatus ByteLink::open_serial() {
   line_.reset(::open(options_.address.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
   if (!line_.is_open()) {
-    // All of these may pass: the device is plugged in, its rights are set a moment later.
+    // All of these may pass: a device is plugged in first and gets its permissions a moment later.
     const int code = errno;
     return lost(reason(code) + (code == ENOENT || code == ENXIO ? "; is it plugged in?"
                                 : code == EACCES
@@ -169,14 +169,14 @@ LinkStatus ByteLink::open_serial() {
   ::cfmakeraw(&line);  // 8 bits, no parity, nothing translated
   line.c_cflag |= CLOCAL | CREAD;
   line.c_cflag &= ~(static_cast<tcflag_t>(CSTOPB) | static_cast<tcflag_t>(CRTSCTS));
-  line.c_cc[VMIN] = 1;  // a read of nothing is then EAGAIN, and 0 is the end of the line
+  line.c_cc[VMIN] = 1;  // an empty read is then EAGAIN, and 0 is the end of the line
   line.c_cc[VTIME] = 0;
   termios taken{};
   if (::cfsetspeed(&line, speed) != 0 || ::tcsetattr(line_.get(), TCSANOW, &line) != 0 ||
       ::tcgetattr(line_.get(), &taken) != 0) {
     return lost("does not take its settings: " + line_reason(errno));
   }
-  // tcsetattr() succeeds if it could do any of it.
+  // tcsetattr() succeeds even if only a part was done.
   if (::cfgetospeed(&taken) != speed) {
     static_cast<void>(lost("does not take " + std::to_string(options_.baud) + " baud"));
     return LinkStatus::kUnusable;
@@ -274,7 +274,7 @@ LinkStatus ByteLink::receive(std::string* bytes, double timeout_s) {
     return LinkStatus::kTimeout;
   }
   if (count == 0) {
-    // An empty datagram is no end.
+    // An empty datagram is not an end.
     return is_datagram() ? LinkStatus::kTimeout
                          : lost(kind_ == Kind::kSerial ? "the line is gone: unplugged?"
                                                        : "the device closed the connection");

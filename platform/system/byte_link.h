@@ -1,12 +1,13 @@
 #pragma once
-// ByteLink: bytes to and from a device over a serial line, TCP or UDP, so that one protocol runs on
-// each of them. It opens and closes as often as its owner wants (a plug pulled and put back), and
-// never waits longer than told.
+// ByteLink: bytes to and from a device over a serial line, TCP or UDP, so that a protocol runs over
+// any of them. It can be closed and reopened any number of times (a plug pulled and put back). No
+// call waits longer than its timeout.
 //
 // Serial: 8 data bits, no parity, 1 stop bit, raw, no flow control; one program at a time. TCP:
-// without delay of small packets. UDP: from and to the one address, each receive() one datagram.
-// One thread uses it; stop() may be called from any other and wakes it. Looking up a host name takes
-// what the system's resolver takes: give a numeric address where that matters.
+// without delay of small packets. UDP: to and from one address; each receive() returns one
+// datagram. Used by one thread; stop() may be called from any other and wakes it. Host names are
+// looked up by the system's resolver, which may take long: use a numeric address where that
+// matters.
 
 #include <cstddef>
 #include <string>
@@ -30,13 +31,13 @@ enum class LinkStatus {
   kUnusable  // will never work; see error()
 };
 
-// Whether a serial line can have this speed here.
+// True if a serial line can have this speed on this system.
 [[nodiscard]] bool is_baud(int baud);
 
-// Of one byte on the wire; 0 but for a serial line.
+// s; the time of one byte on a serial line; 0 for TCP and UDP.
 [[nodiscard]] double wire_time_of_byte_s(const ByteLinkOptions& options);
 
-// Whether this is tcp://host:port or udp://host:port, without a user, a password or a path.
+// True for tcp://host:port or udp://host:port without user, password and path.
 [[nodiscard]] bool is_byte_link_url(const std::string& text);
 
 class ByteLink {
@@ -45,21 +46,22 @@ class ByteLink {
   ByteLink(const ByteLink&) = delete;
   ByteLink& operator=(const ByteLink&) = delete;
 
-  // Begins to open, or says why not. On kOk finish_open() is next.
+  // Starts to open; on failure see error(). After kOk call finish_open().
   [[nodiscard]] LinkStatus open();
   [[nodiscard]] LinkStatus finish_open(double timeout_s);
   void close() { line_.reset(); }
 
-  // The bytes are few: what the system does not take at once counts as a lost link.
+  // For a few bytes: if the system does not take all of them at once, the link counts as lost.
   [[nodiscard]] LinkStatus send(std::string_view bytes);
 
-  // Waits for bytes and puts what is there into *bytes, at most 512. While closed it only waits.
+  // Waits for bytes and puts those that are there into *bytes, at most 512. While closed it only
+  // waits.
   [[nodiscard]] LinkStatus receive(std::string* bytes, double timeout_s);
 
   void stop();  // every later call that could wait returns kStopped
 
   [[nodiscard]] bool is_datagram() const { return kind_ == Kind::kUdp; }
-  // What is wrong, without the link's name; valid after kLost and kUnusable.
+  // What is wrong, without the link's name. Valid after kLost and kUnusable.
   [[nodiscard]] const std::string& error() const { return error_; }
   [[nodiscard]] const std::string& name() const { return options_.address; }
 

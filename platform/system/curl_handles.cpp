@@ -28,7 +28,7 @@ CurlEasyPtr make_http_handle(const std::string& user, const std::string& passwor
   curl_easy_setopt(easy.get(), CURLOPT_NOPROXY, "*");
   curl_easy_setopt(easy.get(), CURLOPT_NOSIGNAL, 1L);
   curl_easy_setopt(easy.get(), CURLOPT_ERRORBUFFER, error_buffer);
-  // Whoever ends need not wait for a name to be looked up.
+  // A thread that ends need not wait for a name look-up.
   curl_easy_setopt(easy.get(), CURLOPT_QUICK_EXIT, 1L);
   return easy;
 }

@@ -1,5 +1,5 @@
 #pragma once
-// Owners of libcurl's handles, and what every HTTP link of ours has in common.
+// Owners of libcurl's handles, and the settings that all HTTP links share.
 
 #include <curl/curl.h>
 
@@ -20,23 +20,25 @@ struct CurlMultiCleanup {
 using CurlEasyPtr = std::unique_ptr<CURL, CurlEasyCleanup>;
 using CurlMultiPtr = std::unique_ptr<CURLM, CurlMultiCleanup>;
 
-// Of an answer's headers, whichever HTTP link: libcurl keeps all of them, without end.
+// Limit on the headers of one answer. libcurl itself would keep any amount.
 constexpr std::size_t kMostHeaderBytes = 64U << 10U;
 constexpr const char* kHeadersTooLong = "the answer's headers are longer than 64 KB";
 
-// A handle without proxy and signals; null if libcurl does not start. methods: CURLAUTH_..., used
-// if user is not empty. error_buffer of CURL_ERROR_SIZE bytes must outlive the handle.
+// Returns a handle without proxy and signals, or null if libcurl does not start. methods:
+// CURLAUTH_..., used if user is not empty. error_buffer has CURL_ERROR_SIZE bytes and must outlive
+// the handle.
 [[nodiscard]] CurlEasyPtr make_http_handle(const std::string& user, const std::string& password,
                                            long methods, char* error_buffer);
 [[nodiscard]] CurlMultiPtr make_curl_multi();
 
-// The CURLAUTH_... that an answer of 401 offers.
+// The CURLAUTH_... methods that a 401 answer offers.
 [[nodiscard]] long offered_methods(CURL* easy);
 
-// Why the answer was 401, for the person; methods as given above.
+// The message to the user on why the answer was 401; methods as in make_http_handle().
 [[nodiscard]] std::string login_error(CURL* easy, const std::string& user, long methods);
 
-// Where a whole answer of the URL `asked` sends the client on; url and error empty: nowhere.
+// Where the complete answer from the URL `asked` redirects to. url and error are empty if it is not
+// a redirection.
 [[nodiscard]] Redirection redirection_of(CURL* easy, const Url& configured,
                                          const std::string& asked, LinkRules::Redirects rule);
 

@@ -8,7 +8,7 @@
 namespace alidade {
 namespace {
 
-// What one character takes of the text, by its first byte; 0: none begins so.
+// Length of a UTF-8 character by its first byte; 0: not a valid first byte.
 std::size_t length_of(unsigned char first) {
   if (first < 0x80) return 1;
   if (first >= 0xC2 && first <= 0xDF) return 2;
@@ -18,7 +18,7 @@ std::size_t length_of(unsigned char first) {
 
 struct Character {
   std::uint32_t code = 0;
-  std::size_t length = 0;  // 0: no UTF-8
+  std::size_t length = 0;  // bytes; 0: not valid UTF-8
 };
 
 Character first_of(std::string_view text) {
@@ -32,7 +32,7 @@ Character first_of(std::string_view text) {
     if ((next & 0xC0U) != 0x80U) return {};
     code = (code << 6U) | (next & 0x3FU);
   }
-  // Longer than it must be, half of a pair, or beyond the last.
+  // Overlong, half of a surrogate pair, or beyond the last code point.
   constexpr std::array<std::uint32_t, 5> kLeast = {0, 0, 0x80, 0x800, 0x10000};
   const bool wrong = code < kLeast[length] || (code >= 0xD800 && code <= 0xDFFF) || code > 0x10FFFF;
   return wrong ? Character() : Character{code, length};

@@ -8,7 +8,7 @@ namespace alidade {
 class FileDescriptor {
  public:
   FileDescriptor() = default;
-  // What open(), socket() and the like return; negative: none.
+  // number: as returned by open(), socket() and the like; negative: none.
   explicit FileDescriptor(int number) : number_(number) {}
   ~FileDescriptor() { reset(); }
   FileDescriptor(FileDescriptor&& other) noexcept : number_(other.release()) {}
@@ -22,9 +22,9 @@ class FileDescriptor {
   [[nodiscard]] bool is_open() const { return number_ >= 0; }
   [[nodiscard]] int get() const { return number_; }  // negative: none
 
-  // Closes what is open, then owns number. Leaves errno as it is.
+  // Closes the current descriptor, then owns number. Preserves errno.
   void reset(int number = kNone);
-  // Gives it away unclosed.
+  // Gives up ownership without closing.
   [[nodiscard]] int release() { return std::exchange(number_, kNone); }
 
  private:

@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::size_t kMostBytes = 300;
 
-// Number and command, as the lock tells them.
+// Number and command of this process, as written into the lock file.
 std::string this_process() {
   std::string command;
   std::string ignored;
@@ -33,13 +33,13 @@ std::string holder_of(int file) {
   char text[kMostBytes];
   const ssize_t size = ::pread(file, text, sizeof text, 0);
   const std::string_view all(text, static_cast<std::size_t>(std::max<ssize_t>(size, 0)));
-  // Not yet written: it was taken just now.
+  // Not written yet: the lock was taken just now.
   const std::size_t end = all.find('\n');
   return end == std::string_view::npos ? "another process"
                                        : "process " + shown(all.substr(0, end), kMostBytes);
 }
 
-// Who had it may have taken the file away between its opening and its locking here.
+// False if the previous owner removed the file after it was opened here and before it was locked.
 bool stands_there(int file, const std::string& name) {
   struct stat opened = {};
   struct stat named = {};
@@ -59,7 +59,7 @@ FileLock::Result FileLock::take(const std::string& path, std::string* why) {
   FileDescriptor file(::open(name.c_str(), O_RDWR | O_CREAT | O_EXCL | kFlags, 0644));
   const bool is_made = file.is_open();
   if (!is_made) file.reset(::open(name.c_str(), O_RDWR | O_CREAT | kFlags, 0644));
-  // Another user's: it can be locked, but not written.
+  // A file of another user: it can be locked, but not written.
   if (!file.is_open() && (errno == EACCES || errno == EROFS))
     file.reset(::open(name.c_str(), O_RDONLY | kFlags));
   if (!file.is_open()) return impossible(errno == ELOOP ? "it is a link" : std::strerror(errno));
@@ -73,7 +73,7 @@ FileLock::Result FileLock::take(const std::string& path, std::string* why) {
   }
   if (!stands_there(file.get(), name)) return take(path, why);
   const std::string holder = this_process();
-  // Only to tell others: the lock holds without it.
+  // For information only: the lock holds without it.
   if (::ftruncate(file.get(), 0) == 0)
     static_cast<void>(::pwrite(file.get(), holder.data(), holder.size(), 0) < 0);
   file_ = std::move(file);

@@ -1,7 +1,9 @@
 #pragma once
-// FileLock: what is kept under a path belongs to one process at a time. A lock of the kernel's on PATH.lock, which holds
-// the number and the command of who has it and stays there, unless it is removed by who made it: the lock itself ends with its process,
-// whatever ended that. Processes of other hosts are kept out where the network file system has locks. Advisory: who only reads needs none.
+// FileLock: reserves what is stored under PATH for one process. It is a kernel lock (flock) on
+// PATH.lock, which holds the process number and command of the owner. The lock ends with its
+// process, however that ends; the file PATH.lock stays unless its creator removes it. Processes on
+// other hosts are excluded if the network file system supports locks. Advisory: readers need no
+// lock.
 
 #include <string>
 
@@ -13,16 +15,16 @@ class FileLock {
  public:
   enum class Result {
     kTaken,
-    kInUse,  // by another
-    kImpossible  // there can be no lock here: a folder that cannot be written, a file system without locks
+    kInUse,      // by another process
+    kImpossible  // no lock is possible: the folder is not writable, or the file system has no locks
   };
 
-  // Waits for nobody. What is not taken leaves one line in *why.
+  // Does not wait. If the lock is not taken, *why is one line.
   [[nodiscard]] Result take(const std::string& path, std::string* why);
   void release() { file_.reset(); }
-  // So, and takes PATH.lock away if this object made it.
+  // Releases, and removes PATH.lock if this object created it.
   void release_and_remove();
-  // PATH.lock, if this object made it.
+  // PATH.lock if this object created it, else empty.
   [[nodiscard]] const std::string& made() const { return made_; }
 
  private:

@@ -1,6 +1,7 @@
 #pragma once
-// FileStamp: whether what stands under a path was changed or replaced, by device, inode, size and times. What is written
-// twice within the clock's tick (some milliseconds) and with the same size looks the same.
+// FileStamp: detects that a file was changed or replaced, by device, inode, size and times. Two
+// writes within one tick of the file system's clock (some milliseconds) that leave the same size
+// are not told apart.
 
 #include <sys/stat.h>
 
@@ -25,7 +26,7 @@ class FileStamp {
   }
   [[nodiscard]] bool operator!=(const FileStamp& other) const { return !(*this == other); }
 
-  // Whether any user of the machine may read it.
+  // True if any user of the machine may read it.
   [[nodiscard]] bool is_public() const { return is_there_ && (status_.st_mode & S_IROTH) != 0; }
 
  private:

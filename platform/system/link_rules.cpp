@@ -30,7 +30,7 @@ std::string port_of(const Url& url) {
   return url.scheme == "rtsps" ? "322" : "554";
 }
 
-// What makes the address another one than that configured; empty: it is the same.
+// How an address differs from the configured one; empty if it does not.
 std::string difference(const Url& configured, const Url& told) {
   if (in_small_letters(told.host) != in_small_letters(configured.host)) return "another host";
   if (told.scheme != configured.scheme) return "another scheme";
@@ -44,8 +44,8 @@ std::string origin_of(const Url& url) {
 
 }  // namespace
 
-// The address to ask is put together of what was judged: another reader of the one that was told might find another host
-// in it.
+// The URL to ask is assembled from the parts that were judged: another parser might find another
+// host in the peer's text.
 Redirection judge_redirection(const Url& configured, const std::string& asked,
                               const std::string& told, LinkRules::Redirects rule) {
   Redirection result;

@@ -15,7 +15,7 @@ constexpr std::size_t kStackBytes = std::size_t{512} << 10;
 
 void* run_niced(void* argument) {
   const std::unique_ptr<std::function<void()>> run(static_cast<std::function<void()>*>(argument));
-  // Of this thread alone, on Linux.
+  // Affects this thread only, on Linux.
   static_cast<void>(::setpriority(PRIO_PROCESS, 0, kNiceness));
   (*run)();
   return nullptr;
@@ -37,7 +37,7 @@ bool NicedThreads::start(std::function<void()> run) {
   const bool started = ::pthread_create(&thread, &attributes, run_niced, argument.get()) == 0;
   ::pthread_attr_destroy(&attributes);
   if (!started) return false;
-  static_cast<void>(argument.release());  // the thread's
+  static_cast<void>(argument.release());  // the thread owns it now
   threads_.push_back(thread);
   return true;
 }

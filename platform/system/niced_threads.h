@@ -1,6 +1,6 @@
 #pragma once
-// NicedThreads: threads at the normal scheduling policy, niced, with small stacks, whatever the thread that starts
-// them runs as.
+// NicedThreads: threads with normal scheduling policy, niced, with small stacks, whatever the
+// scheduling of the thread that starts them.
 
 #include <pthread.h>
 
@@ -16,7 +16,7 @@ class NicedThreads {
   NicedThreads(const NicedThreads&) = delete;
   NicedThreads& operator=(const NicedThreads&) = delete;
 
-  // False: there can be no more.
+  // False: the system cannot start another thread.
   [[nodiscard]] bool start(std::function<void()> run);
   // Waits for all of them to end.
   void join();

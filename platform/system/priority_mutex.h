@@ -1,7 +1,8 @@
 #pragma once
-// PriorityMutex: a std::mutex for threads of different priorities: who holds it runs, while another waits for it, as that one does.
-// With a std::mutex a thread under SCHED_FIFO waits for one that has no processor, on a busy machine for tens of milliseconds.
-// As POSIX has it (PTHREAD_PRIO_INHERIT). Use it with std::lock_guard.
+// PriorityMutex: a std::mutex with priority inheritance (POSIX, PTHREAD_PRIO_INHERIT), for threads
+// of different priorities: while a thread waits, the owner runs at that thread's priority. With a
+// std::mutex, a SCHED_FIFO thread would wait for an owner that gets no processor, tens of
+// milliseconds on a busy machine. Use it with std::lock_guard.
 
 #include <pthread.h>
 
@@ -20,7 +21,7 @@ class PriorityMutex {
   PriorityMutex(const PriorityMutex&) = delete;
   PriorityMutex& operator=(const PriorityMutex&) = delete;
 
-  // None of its errors can be but by a mistake of ours: it is locked twice, or unlocked by another thread.
+  // Errors are possible only by a bug here: locking twice, or unlocking from another thread.
   void lock() { ::pthread_mutex_lock(&mutex_); }
   void unlock() { ::pthread_mutex_unlock(&mutex_); }
 

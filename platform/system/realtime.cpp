@@ -19,7 +19,7 @@
 #include <fstream>
 #include <sstream>
 
-// Set by the linker where it was told to lay that code together (cmake/batch_code.ld), else null.
+// Set by the linker if it gathers that code (cmake/batch_code.ld), else null.
 extern "C" {
 extern const char alidade_batch_code_begin[] __attribute__((weak));
 extern const char alidade_batch_code_end[] __attribute__((weak));
@@ -28,7 +28,7 @@ extern const char alidade_batch_code_end[] __attribute__((weak));
 namespace alidade {
 namespace {
 
-// A locked process under a finite limit fails in some later allocation instead of now.
+// Under a finite limit, a locked process would fail in some later allocation instead of now.
 bool memory_lock_is_limited() {
   rlimit limit{};
   return geteuid() != 0 && getrlimit(RLIMIT_MEMLOCK, &limit) == 0 &&
@@ -67,7 +67,7 @@ void set_processor(int cpu, RealtimeReport* report) {
 
 std::atomic<bool> freed_memory_is_kept{false};
 
-// The kernel and the loader tell addresses as numbers.
+// The kernel and the loader give addresses as numbers.
 char* at_address(std::uintptr_t address) {
   return reinterpret_cast<char*>(address);  // NOLINT(performance-no-int-to-ptr)
 }
@@ -77,8 +77,8 @@ struct Mapping {
   char* begin = nullptr;
   std::size_t size = 0;  // bytes
   std::string permissions;
-  std::string path;        // empty or in brackets: of no file
-  bool is_changed = true;  // pages of it are no longer the file's
+  std::string path;        // empty or in brackets: not backed by a file
+  bool is_changed = true;  // some of its pages differ from the file
 
   [[nodiscard]] bool is_data() const {
     return permissions == "rw-p" && (path.empty() || path[0] == '[');
@@ -117,7 +117,7 @@ std::vector<Mapping> all_mappings() {
   return mappings;
 }
 
-// Code and data that the real-time thread may use.
+// True for files with code and data that the real-time thread may use.
 bool is_of_the_real_time_thread(const std::string& path, const std::string& program) {
   if (path == program) return true;
   const std::string name = path.substr(path.rfind('/') + 1);
@@ -133,7 +133,7 @@ struct AddressRange {
   [[nodiscard]] std::size_t size() const { return static_cast<std::size_t>(end - begin); }
 };
 
-// What is left of a mapping; left_out: whole pages, in any order.
+// A mapping without the ranges left_out, which are whole pages in any order.
 std::vector<AddressRange> rest_of(const Mapping& mapping,
                                   const std::vector<AddressRange>& left_out) {
   std::vector<AddressRange> rest{{mapping.begin, mapping.begin + mapping.size}};
@@ -160,10 +160,11 @@ AddressRange whole_pages(std::uintptr_t begin, std::uintptr_t end) {
   return {at_address((begin + page - 1) / page * page), at_address(end / page * page)};
 }
 
-// What the real-time thread does without, though it is in mappings that are brought in:
-//   - the zeros that the data of other libraries end with: of no file in /proc/self/smaps, and megabytes in a library of codecs
-//   - tables for exceptions, which lie together behind the constants: it throws none
-//   - the program's code of rooms that it never enters
+// Ranges that the real-time thread does not need, within the mappings that are paged in:
+//   - the zeros at the end of other libraries' data: /proc/self/smaps lists them without a file,
+//     and a library of codecs has megabytes of them
+//   - exception tables, which lie together behind the constants: the thread throws none
+//   - program code of rooms that it never enters
 std::vector<AddressRange> done_without(const std::string& program) {
   struct Search {
     const std::string& program;
@@ -201,7 +202,7 @@ std::vector<AddressRange> done_without(const std::string& program) {
   return search.found;
 }
 
-// What there is now is locked as it is touched, but for what is brought in.
+// Existing memory is locked as it is touched, except what is paged in here.
 bool lock_all() {
   std::array<char, PATH_MAX> program{};
   if (readlink("/proc/self/exe", program.data(), program.size() - 1) < 0) return false;
@@ -219,11 +220,11 @@ bool lock_all() {
     const std::vector<AddressRange> others = rest_of(mapping, rest);
     let_go.insert(let_go.end(), others.begin(), others.end());
   }
-  // What is needed again comes again, from the same file.
+  // If one of these pages is needed again, the kernel reads it from the same file.
   for (const AddressRange& range : let_go)
     static_cast<void>(madvise(range.begin, range.size(), MADV_DONTNEED));
   if (mlockall(MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT) != 0) return false;
-  // A mapping may have gone since: then there is nothing to lock.
+  // A mapping may have been removed since: then there is nothing to lock.
   return std::all_of(brought_in.begin(), brought_in.end(), [](const AddressRange& range) {
     return mlock(range.begin, range.size()) == 0 || errno == ENOMEM;
   });
@@ -236,7 +237,7 @@ void lock_memory(RealtimeReport* report) {
         "LimitMEMLOCK=infinity");
     return;
   }
-  // First, so that what malloc has is locked once and stays.
+  // First, so that malloc's memory is locked once and stays.
   freed_memory_is_kept = true;
   const bool kept = mallopt(M_TRIM_THRESHOLD, -1) == 1 &&
                     mallopt(M_MMAP_THRESHOLD, static_cast<int>(kFetchedAlone)) == 1;
@@ -258,8 +259,7 @@ __attribute__((noinline)) void touch_stack() {
 }
 
 void prefault_stack(RealtimeReport* report) {
-  constexpr std::size_t kReserve = std::size_t{64}
-                                   << 10;  // what the caller and this one still need
+  constexpr std::size_t kReserve = std::size_t{64} << 10;  // for the caller and this function
   pthread_attr_t attributes;
   void* lowest = nullptr;
   std::size_t size = 0;
@@ -316,8 +316,8 @@ void return_freed_memory() {
 }
 
 std::string set_lowest_priority() {
-  // Where the process may run, as its first thread does: not on the processor that a thread that started
-  // this one has for itself.
+  // Runs on the processors of the process's first thread, not on the one that the starting thread
+  // has for itself.
   cpu_set_t cpus;
   if (sched_getaffinity(getpid(), sizeof cpus, &cpus) == 0) {
     static_cast<void>(pthread_setaffinity_np(pthread_self(), sizeof cpus, &cpus));
@@ -327,7 +327,7 @@ std::string set_lowest_priority() {
   if (error == 0) return "";
   constexpr int kNicest = 19;
   if (pthread_setschedparam(pthread_self(), SCHED_OTHER, &none) == 0 &&
-      setpriority(PRIO_PROCESS, 0, kNicest) == 0) {  // of this thread alone, on Linux
+      setpriority(PRIO_PROCESS, 0, kNicest) == 0) {  // for this thread only, on Linux
     return "";
   }
   return std::string("cannot run at the lowest priority (") + std::strerror(error) + ")";
@@ -348,7 +348,8 @@ PageFaults page_faults_of(int thread) {
   std::ifstream file("/proc/self/task/" + std::to_string(thread) + "/stat");
   std::string line;
   std::getline(file, line);
-  // What follows the name, which is in parentheses and may hold blanks: state, six more, minflt, cminflt, majflt.
+  // The thread's name is in parentheses and may contain blanks. After it: state, six more, minflt,
+  // cminflt, majflt.
   std::istringstream words(line.substr(std::min(line.size(), line.rfind(')') + 1)));
   std::string skipped;
   for (int i = 0; i < 7; ++i) words >> skipped;

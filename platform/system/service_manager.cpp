@@ -12,7 +12,7 @@ namespace {
 
 constexpr int kKeepEnvironment = 0;
 
-// Whether it arrived or not changes nothing here.
+// Failure is ignored: nothing here depends on it.
 void tell(const std::string& text) { static_cast<void>(sd_notify(kKeepEnvironment, text.c_str())); }
 
 double half_of_the_watchdog_s() {

@@ -1,8 +1,8 @@
 #pragma once
-// ServiceManager: what systemd is told of this process (sd_notify(3), Type=notify): that it has started, what it
-// does, that it lives, that it ends. Without $NOTIFY_SOCKET nobody is there, and every call does nothing.
-// Messages go into systemd's socket, which waits only if systemd does not read. One that cannot be sent is lost.
-// One thread uses it.
+// ServiceManager: reports to systemd (sd_notify(3), Type=notify) that this process has started,
+// what it does, that it is alive, and that it ends. Without $NOTIFY_SOCKET every call does nothing.
+// A call blocks only if systemd does not read its socket. A message that cannot be sent is lost.
+// Used by one thread.
 
 #include <string>
 
@@ -14,12 +14,13 @@ class ServiceManager {
   ServiceManager();
 
   [[nodiscard]] bool is_there() const { return is_there_; }
-  // How often to call alive(): half of the time after which a silent process is killed. Infinity: nobody watches.
+  // s; how often to call alive(): half the time after which systemd kills a silent process.
+  // Infinity: no watchdog is set.
   [[nodiscard]] double alive_period_s() const { return alive_period_s_; }
 
   void ready() const;
   void status(const std::string& line) const;  // shown by `systemctl status`
-  void alive() const;                          // nothing, if nobody watches
+  void alive() const;                          // does nothing without a watchdog
   void stopping() const;
 
  private:

@@ -1,5 +1,5 @@
 #pragma once
-// Foreign text and numbers as an error shows them: short, on one line, with nothing that a terminal
+// Foreign text and numbers for error messages: short, on one line, without anything that a terminal
 // would obey.
 
 #include <cstddef>
@@ -11,7 +11,7 @@
 
 namespace alidade {
 
-// The first `most` bytes, cut between characters of UTF-8, escaped.
+// The first `most` bytes, cut between UTF-8 characters, escaped.
 [[nodiscard]] inline std::string shown(std::string_view text, std::size_t most = 80) {
   const auto is_inside = [&](std::size_t at) {
     return (static_cast<unsigned char>(text[at]) & 0xC0U) == 0x80U;
@@ -24,7 +24,7 @@ namespace alidade {
   return escaped(text);
 }
 
-// Nine digits; a forged 1e300 has not three hundred.
+// Nine digits: a forged 1e300 is not printed with three hundred.
 [[nodiscard]] inline std::string shown(double number) {
   char text[32];
   std::snprintf(text, sizeof text, "%.9g", number);

@@ -1,5 +1,5 @@
 #pragma once
-// Pieces of text: blanks taken off, numbers read, things counted.
+// Small text functions: trim, parse a number, count things.
 
 #include <cmath>
 #include <cstddef>
@@ -11,7 +11,7 @@
 
 namespace alidade {
 
-// text without what of `blanks` stands at its ends.
+// text without leading and trailing characters of `blanks`.
 [[nodiscard]] inline std::string_view trimmed(std::string_view text, std::string_view blanks) {
   const std::size_t first = text.find_first_not_of(blanks);
   return first == std::string_view::npos
@@ -19,7 +19,7 @@ namespace alidade {
              : text.substr(first, text.find_last_not_of(blanks) - first + 1);
 }
 
-// As strtod reads it. None: text is no number as a whole, or not a finite one.
+// Parses as strtod does. nullopt if text as a whole is not a number, or not a finite one.
 [[nodiscard]] inline std::optional<double> parse_number(std::string_view text) {
   const std::string copy(text);  // strtod needs the terminating null
   char* end = nullptr;

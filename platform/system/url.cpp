@@ -34,10 +34,10 @@ std::string part(const Handle& handle, CURLUPart which, unsigned flags = 0) {
 
 bool parse_url(const std::string& text, Url* url, std::string* error) {
   const Handle handle = parsed(text);
-  // A zone with an @ in it would make a user of what stands before, where the URL is shown.
+  // With an @ in the zone, the URL as shown would seem to have a user before it.
   if (!handle || part(handle, CURLUPART_ZONEID).find('@') != std::string::npos) {
     const std::size_t scheme_end = text.find("://");
-    const std::size_t at = text.rfind('@');  // what stands before it may be a password
+    const std::size_t at = text.rfind('@');  // the text before it may be a password
     const std::string rest = at == std::string::npos ? text : "..." + text.substr(at);
     url->bare =
         shown(scheme_end == std::string::npos ? rest : text.substr(0, scheme_end) + "://...");

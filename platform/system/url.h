@@ -15,10 +15,10 @@ struct Url {
   std::string bare;      // the URL without user and password
 };
 
-// False: text is no URL; *error says so, and url->bare is what of it can be shown.
+// On false, text is not a URL, *error says so, and url->bare is the part that may be shown.
 [[nodiscard]] bool parse_url(const std::string& text, Url* url, std::string* error);
 
-// `told`, which may be relative to the URL `base`, as a whole one; empty: neither.
+// Resolves `told`, which may be relative, against the URL `base`. Empty if the result is not a URL.
 [[nodiscard]] std::string resolved_url(const std::string& base, const std::string& told);
 
 }  // namespace alidade

@@ -1,6 +1,7 @@
 #pragma once
-// Watchdog: ends, at a deadline, a call that has no deadline of its own. It lives as long as the call; `bark` runs on a thread
-// of its own, at most once, and must be allowed there. Costs a thread: for calls that are made once a connection.
+// Watchdog: ends a call that has no deadline of its own. Lives as long as the call. At the
+// deadline, `bark` runs at most once, on a thread of the watchdog; it must be safe there. Costs a
+// thread, so use it for calls made once per connection.
 
 #include <chrono>
 #include <condition_variable>
@@ -25,7 +26,7 @@ class Watchdog {
   Watchdog(const Watchdog&) = delete;
   Watchdog& operator=(const Watchdog&) = delete;
 
-  // The call is over. Whether the deadline was before that.
+  // Call it when the call has returned. True if the deadline came first.
   [[nodiscard]] bool stand_down() {
     {
       const std::lock_guard<std::mutex> lock(mutex_);
@@ -41,7 +42,7 @@ class Watchdog {
   std::condition_variable over_soon_;
   bool over_ = false;
   bool barked_ = false;
-  std::thread thread_;  // last: it uses the others
+  std::thread thread_;  // last, as it uses the other members
 };
 
 }  // namespace alidade

@@ -19,14 +19,14 @@ namespace alidade {
 namespace {
 
 constexpr const char* kUnfinished = ".unfinished-";
-constexpr const char* kRandom = "XXXXXX";  // what mkostemp puts letters and digits for
+constexpr const char* kRandom = "XXXXXX";  // replaced by mkostemp with letters and digits
 
-// A file beside the target, renamed onto it once it is safely on disk; otherwise removed.
+// A file beside the target: renamed onto it once it is synced to the disk, else removed.
 class TemporaryFile {
  public:
   explicit TemporaryFile(const std::string& target) : name_(target + kUnfinished + kRandom) {
     descriptor_ = ::mkostemp(name_.data(), O_CLOEXEC);
-    // Where the file system has no locks, nobody can take one, either.
+    // If the file system has no locks, nobody else can take one, either.
     if (descriptor_ >= 0) static_cast<void>(::flock(descriptor_, LOCK_EX | LOCK_NB));
   }
   TemporaryFile(const TemporaryFile&) = delete;
@@ -37,10 +37,10 @@ class TemporaryFile {
     if (!renamed_) ::unlink(name_.c_str());
   }
 
-  // False leaves the reason in errno.
+  // On false the reason is in errno.
   bool replace(const std::string& target, const std::string& content) {
     if (descriptor_ < 0 || !write_all(descriptor_, content)) return false;
-    // mkostemp lets the owner alone read it; what is stored here is no secret.
+    // mkostemp lets only the owner read the file; what is stored here is no secret.
     renamed_ = ::fchmod(descriptor_, 0644) == 0 && ::fsync(descriptor_) == 0 &&
                ::rename(name_.c_str(), target.c_str()) == 0;
     return renamed_;
@@ -57,14 +57,14 @@ std::string folder_of(const std::string& path) {
   return slash == std::string::npos ? "." : path.substr(0, slash + 1);
 }
 
-// What it would have become; empty: it is no unfinished file.
+// The name it would finally have; empty if this is not an unfinished file.
 std::string finished_name(const std::string& name) {
   const std::size_t mark = name.rfind(kUnfinished);
   const std::size_t length = std::strlen(kUnfinished) + std::strlen(kRandom);
   return mark == std::string::npos || name.size() != mark + length ? "" : name.substr(0, mark);
 }
 
-// Unless somebody is writing it.
+// Unless a process is still writing it.
 bool remove_left_over(const std::string& path) {
   const int descriptor = ::open(path.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
   if (descriptor < 0) return false;
@@ -75,8 +75,8 @@ bool remove_left_over(const std::string& path) {
   return left_over;
 }
 
-// Makes the rename survive a power cut, where the file system can do so; elsewhere the old file,
-// whole, may come back.
+// Makes the rename survive a power cut, if the file system can. Otherwise the old file may come
+// back, whole.
 void sync_folder_of(const std::string& path) {
   const int descriptor = ::open(folder_of(path).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (descriptor < 0) return;
@@ -143,9 +143,9 @@ FileDescriptor open_to_read(const std::string& path, std::string* error) {
     *error = path + ": cannot be read: " + why;
     return FileDescriptor();
   };
-  // A pipe would be waited for, a terminal taken.
+  // A plain open would wait for a pipe's writer, and would take a terminal as the controlling one.
   FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY));
-  // A socket cannot be opened.
+  // open() gives ENXIO for a socket.
   if (!file.is_open() && errno == ENXIO) return refuse("not a file, but a socket or a device");
   if (!file.is_open()) return refuse(std::strerror(errno));
   struct stat status = {};
@@ -171,7 +171,7 @@ bool read_file(const std::string& path, std::string* content, std::string* error
     return refuse(too_large);
   std::string bytes;
   bytes.reserve(static_cast<std::size_t>(status.st_size));
-  // It may grow meanwhile, and what the kernel makes as it is read has no size.
+  // The file may grow meanwhile, and a file that the kernel generates on reading has size 0.
   for (char piece[16384];;) {
     const ssize_t n = ::read(file.get(), piece, sizeof piece);
     if (n < 0 && errno == EINTR) continue;

@@ -7,7 +7,7 @@
 namespace alidade {
 namespace {
 
-// It decodes, and would take a forged size for true.
+// This decodes pictures, and would take a forged size for true.
 int find_stream_info(AVFormatContext* format) {
   std::vector<AVDictionary*> options(format->nb_streams, nullptr);
   for (AVDictionary*& of_stream : options) {
@@ -25,7 +25,7 @@ AvFile::~AvFile() { avformat_close_input(&format_); }
 bool AvFile::open(const std::string& path, std::string* error) {
   int code = avformat_open_input(&format_, path.c_str(), nullptr, nullptr);
   if (code >= 0) {
-    code = find_stream_info(format_);  // how far pictures are out of order
+    code = find_stream_info(format_);  // finds out how far pictures are out of order
   }
   if (code < 0) {
     *error = path + ": " + av_error_text(code);

@@ -1,5 +1,6 @@
 #pragma once
-// AvFile: the packets of a video file's one video stream, by libavformat. One thread at a time.
+// AvFile: the packets of the one video stream of a video file, by libavformat. One thread at a
+// time.
 
 #include <string>
 
@@ -14,13 +15,13 @@ class AvFile {
   AvFile(const AvFile&) = delete;
   AvFile& operator=(const AvFile&) = delete;
 
-  // False leaves `path: why` in *error.
+  // On false, *error is `path: why`.
   [[nodiscard]] bool open(const std::string& path, std::string* error);
   [[nodiscard]] bool is_open() const { return stream_ != nullptr; }
-  // Valid once it is open.
+  // Valid once the file is open.
   [[nodiscard]] const AVStream& stream() const { return *stream_; }
 
-  // The next one. False: the end, or where a kill cut the file off.
+  // Reads the next packet. False: the end, or the place where a kill cut the file off.
   [[nodiscard]] bool read(AVPacket* packet);
 
  private:

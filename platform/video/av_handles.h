@@ -36,7 +36,7 @@ inline std::string av_error_text(int code) {
   return text;
 }
 
-// libav's log goes to stderr and may hold passwords; every error reaches the caller as its own line.
+// libav's log goes to stderr and may contain passwords. Errors reach the caller as a line anyway.
 inline void silence_av_log() { av_log_set_level(AV_LOG_QUIET); }
 
 }  // namespace alidade

@@ -9,10 +9,10 @@ namespace {
 using Bytes = std::vector<std::uint8_t>;
 
 constexpr int kMostPictures = 1 << 15;
-constexpr int kRecoveryPoint = 6;  // SEI's payload type, in both
+constexpr int kRecoveryPoint = 6;  // SEI payload type, in both standards
 
 struct NalUnit {
-  const std::uint8_t* begin;  // behind the start code
+  const std::uint8_t* begin;  // after the start code
   const std::uint8_t* end;
   std::size_t size() const { return static_cast<std::size_t>(end - begin); }
 };
@@ -43,7 +43,7 @@ class NalUnits {
     const std::uint8_t* const begin = start_ + kStartCode;
     start_ = find_start(begin, end_);
     const std::uint8_t* last = start_;
-    while (last > begin && last[-1] == 0) --last;  // fills, or belongs to the next start code
+    while (last > begin && last[-1] == 0) --last;  // filler, or part of the next start code
     return NalUnit{begin, last};
   }
 
@@ -56,7 +56,7 @@ struct Kind {
   std::size_t header;  // bytes
   unsigned type;
   bool is_slice;
-  bool is_base;  // the only layer that is decoded
+  bool is_base;  // belongs to the only layer that is decoded
 };
 
 std::optional<Kind> kind_of(CodedBy codec, const NalUnit& nal) {
@@ -76,7 +76,7 @@ bool is_random_access(CodedBy codec, unsigned type) {
   return codec == CodedBy::kH264 ? type == 5 : type >= 16 && type <= 23;
 }
 
-// The payload without the bytes that keep start codes out of it.
+// The payload without the bytes that prevent start codes in it.
 Bytes unescaped(const std::uint8_t* begin, const std::uint8_t* end) {
   Bytes payload;
   payload.reserve(static_cast<std::size_t>(end - begin));
@@ -104,7 +104,7 @@ void append_escaped(const Bytes& payload, Bytes* data) {
   }
 }
 
-// Reads zeros beyond the end, and says so.
+// Reads zeros beyond the end; ok() is false then.
 class Bits {
  public:
   explicit Bits(const Bytes& bytes, std::size_t first_byte = 0)
@@ -123,7 +123,7 @@ class Bits {
     }
     return value;
   }
-  // ue(v): as many zeros as there are bits behind the one.
+  // ue(v): n zeros, a one, n bits.
   std::uint32_t unsigned_code() {
     int zeros = 0;
     while (zeros < 32 && ok() && !flag()) ++zeros;
@@ -141,7 +141,7 @@ class Bits {
   std::size_t at_;
 };
 
-// SEI's messages: type and size, each in bytes of which the last is not 255.
+// SEI messages: type and size, each in bytes of which all but the last are 255.
 std::optional<int> recovery_of(CodedBy codec, const Bytes& payload) {
   std::size_t at = 0;
   const auto number = [&] {
@@ -165,7 +165,7 @@ std::optional<int> recovery_of(CodedBy codec, const Bytes& payload) {
   return std::nullopt;
 }
 
-// Where a parameter set says how many pictures may overtake: the bits of each such number.
+// Bit positions of a number in a parameter set that says how many pictures may be reordered.
 struct Range {
   std::size_t begin;
   std::size_t end;
@@ -237,7 +237,7 @@ Ranges h264_reordering(const Bytes& sps) {
   if (!bits.flag()) bits.skip(1);
   bits.skip(1);
   if (bits.flag()) skip_codes(&bits, 4);
-  if (!bits.flag()) return ranges;  // no usability information
+  if (!bits.flag()) return ranges;  // no VUI (video usability information)
   if (bits.flag() && bits.take(8) == 255) bits.skip(32);
   if (bits.flag()) bits.skip(1);
   if (bits.flag()) {
@@ -253,7 +253,7 @@ Ranges h264_reordering(const Bytes& sps) {
   if (of_nal_units || of_slices) bits.skip(1);
   bits.skip(1);
   if (!bits.flag())
-    return ranges;  // no restrictions: libav then waits for the first that overtakes
+    return ranges;  // no restrictions given: libav then waits for the first reordered picture
   bits.skip(1);
   skip_codes(&bits, 4);
   add_unless_zero(&bits, &ranges);
@@ -294,7 +294,8 @@ Ranges h265_reordering(const Bytes& sps) {
   return bits.ok() ? ranges : Ranges{};
 }
 
-// A 0 in place of each range: one bit, 1. The payload's end is its last 1, and zeros up to a whole byte.
+// Replaces each range by ue(v) 0, which is one bit, 1. The payload ends with a 1 and zeros up to a
+// whole byte.
 Bytes with_zeros(const Bytes& payload, const Ranges& ranges) {
   std::size_t end = 8 * payload.size();
   const auto bit = [&](std::size_t i) { return (payload[i / 8] >> (7 - i % 8) & 1U) != 0; };
@@ -325,7 +326,8 @@ CodedPicture look_at(CodedBy codec, const std::uint8_t* data, std::size_t size) 
     const std::optional<Kind> kind = kind_of(codec, *nal);
     if (!kind || !kind->is_base) continue;
     if (kind->is_slice) {
-      // H.264: number of its first macroblock, ue(v); H.265: a flag.
+      // First field of the slice header. H.264: number of the first macroblock, ue(v). H.265: a
+      // flag.
       picture.has_beginning = (nal->begin[kind->header] & 0x80U) != 0;
       picture.needs_no_other = is_random_access(codec, kind->type);
       return picture;

@@ -1,9 +1,8 @@
 #pragma once
-// What stands in a picture coded by H.264 (ITU-T H.264, 7.3) or H.265 (ITU-T H.265, 7.3) that libav does not tell: where it
-// can be begun to decode, and a promise of reordering that no picture keeps.
-//
-// Data is as libavformat gives it: NAL units behind start codes (Annex B), from the picture's first on. Any bytes will do.
-// Looks no further than the first slice. Pure functions.
+// What libav does not report of a picture coded by H.264 (ITU-T H.264, 7.3) or H.265 (ITU-T H.265,
+// 7.3): whether decoding can start there, and a promise of reordering that no picture keeps. Data
+// is as libavformat delivers it: NAL units behind start codes (Annex B), from the first one of the
+// picture. Any bytes are safe. Only the data up to the first slice is read. Pure functions.
 
 #include <cstddef>
 #include <cstdint>
@@ -15,17 +14,18 @@ namespace alidade {
 enum class CodedBy { kH264, kH265 };
 
 struct CodedPicture {
-  bool has_beginning = false;   // its first slice is here, and the top of the picture is in it
+  bool has_beginning = false;   // its first slice is here, with the top of the picture
   bool needs_no_other = false;  // H.264: IDR; H.265: IRAP
-  // By a recovery point (SEI): decoding may begin here, and so many pictures later all is right. Those that count
-  // in H.264 are reference pictures. At most 2^15.
+  // From a recovery point (SEI): decoding may start here, and the picture is right after this
+  // number of pictures (in H.264 only reference pictures count). At most 2^15.
   std::optional<int> right_after;
 };
 
 [[nodiscard]] CodedPicture look_at(CodedBy codec, const std::uint8_t* data, std::size_t size);
 
-// The same data, whose parameter sets (SPS) say that no picture overtakes another: libav's decoders hold pictures back for
-// as long as an SPS allows for, though none may come. Nothing where no SPS allows for any.
+// Returns the same data with parameter sets (SPS) that permit no reordering. libav's decoders hold
+// back as many pictures as an SPS permits to be reordered, even if none are. nullopt if no SPS
+// permits any.
 [[nodiscard]] std::optional<std::vector<std::uint8_t>> without_reordering(CodedBy codec,
                                                                           const std::uint8_t* data,
                                                                           std::size_t size);

@@ -17,7 +17,7 @@ void JpegDecoder::Close::operator()(void* handle) const { tjDestroy(handle); }
 
 JpegDecoder::JpegDecoder() : handle_(tjInitDecompress()) {}
 
-// A handle whose header went wrong takes every later picture for the same (libjpeg-turbo 2.1).
+// After a broken header the handle takes every later picture for the same one (libjpeg-turbo 2.1).
 bool JpegDecoder::fail(const std::string& error) {
   error_ = error;
   handle_.reset(tjInitDecompress());
@@ -37,7 +37,7 @@ bool JpegDecoder::read_size(std::string_view jpeg, int* width, int* height) {
                           &colours) != 0) {
     return fail(std::string("damaged JPEG picture: ") + tjGetErrorStr2(handle_.get()));
   }
-  // Tables alone are a whole JPEG stream to the library.
+  // For the library, tables alone are a complete JPEG stream.
   if (*width < 1 || *height < 1) {
     return fail("damaged JPEG picture: it has no size");
   }
@@ -63,7 +63,7 @@ bool JpegDecoder::decode(std::string_view jpeg, Picture* picture) {
   if (tjDecompress2(handle_.get(), bytes_of(jpeg), jpeg.size(), luma.get(), width, width, height,
                     TJPF_GRAY, TJFLAG_LIMITSCANS) != 0) {
     const std::string message = tjGetErrorStr2(handle_.get());
-    // "Corrupt JPEG data: 2 extraneous bytes before marker 0xd9": all rows are there.
+    // "Corrupt JPEG data: 2 extraneous bytes before marker 0xd9": all rows were decoded.
     if (tjGetErrorCode(handle_.get()) != TJERR_WARNING ||
         message.find("extraneous bytes before marker 0xd9") == std::string::npos) {
       return fail("damaged JPEG picture: " + message);

@@ -1,9 +1,9 @@
 #pragma once
-// JpegDecoder: a JPEG picture to its luma plane, by libjpeg-turbo. The chroma is neither transformed
-// nor converted. Pictures without Huffman tables (as in AVI) are decoded with the standard ones.
-// A picture that is cut off or damaged is told from a whole one; excess bytes before its end marker,
-// which some cameras write, are no damage. A picture of hundreds of scans is refused: a few forged bytes
-// must not hold the thread for minutes. One thread at a time; the memory of pictures is used again (LumaPool).
+// JpegDecoder: decodes the luma plane of JPEG pictures by libjpeg-turbo. The chroma is neither
+// transformed nor converted. Pictures without Huffman tables (as in AVI) use the standard ones.
+// Cut-off or damaged pictures are detected; excess bytes before the end marker, which some cameras
+// write, are not damage. A picture of hundreds of scans is refused: a few forged bytes must not
+// occupy the thread for minutes. One thread at a time. Memory is reused (LumaPool).
 
 #include <cstddef>
 #include <memory>
@@ -19,13 +19,13 @@ class JpegDecoder {
  public:
   JpegDecoder();
 
-  // Of the header alone. False: no JPEG, or larger than any camera's picture.
+  // Reads only the header. False: not a JPEG, or larger than any camera's picture.
   [[nodiscard]] bool read_size(std::string_view jpeg, int* width, int* height);
 
   // False: see error().
   [[nodiscard]] bool decode(std::string_view jpeg, Picture* picture);
 
-  // One line; valid after read_size() or decode() said false.
+  // One line; valid after read_size() or decode() returned false.
   [[nodiscard]] const std::string& error() const { return error_; }
 
  private:

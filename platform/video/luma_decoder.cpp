@@ -54,7 +54,7 @@ bool LumaDecoder::open(const AVCodecParameters& parameters, bool low_delay,
   if (code >= 0 && coded_by_ && low_delay) {
     const auto changed = without_reordering(*coded_by_, context_->extradata,
                                             static_cast<std::size_t>(context_->extradata_size));
-    // It is shorter: zeros stand for fewer bits.
+    // The changed data is shorter: zeros take fewer bits.
     if (changed && changed->size() <= static_cast<std::size_t>(context_->extradata_size)) {
       std::copy(changed->begin(), changed->end(), context_->extradata);
       context_->extradata_size = static_cast<int>(changed->size());
@@ -68,7 +68,7 @@ bool LumaDecoder::open(const AVCodecParameters& parameters, bool low_delay,
       context_->has_b_frames = 0;
     }
     if (codec->id == AV_CODEC_ID_MJPEG) {
-      // Otherwise a cut off picture passes for a whole one.
+      // Otherwise a cut-off picture passes as complete.
       context_->err_recognition |= AV_EF_EXPLODE;
     }
     code = avcodec_open2(context_.get(), codec, nullptr);
@@ -88,7 +88,7 @@ void LumaDecoder::flush() {
   begun_ = false;
 }
 
-// libav's decoder of H.264 waits by itself, that of H.265 does not.
+// libav's H.264 decoder waits by itself; that of H.265 does not.
 void LumaDecoder::begin(const AVPacket& packet) {
   const CodedPicture coded =
       look_at(*coded_by_, packet.data, static_cast<std::size_t>(packet.size));
@@ -97,7 +97,7 @@ void LumaDecoder::begin(const AVPacket& packet) {
   begun_ = true;
 }
 
-// The packet, with parameter sets that forbid what open() was told; null where it says nothing else.
+// The packet with parameter sets that permit no reordering; null if they need no change.
 PacketPtr LumaDecoder::in_decoding_order(const AVPacket& packet) const {
   if (!coded_by_ || !low_delay_) return nullptr;
   const auto changed =

@@ -1,9 +1,8 @@
 #pragma once
-// LumaPool: memory of luma planes that is used again. Memory that is fresh for each picture is hundreds of page faults a picture, which
-// the kernel fills with zeros.
-//
-// A plane goes back to the pool when its last owner lets go of it, on any thread, and even after the pool. Planes of another size
-// than the last one taken, and more than kKept, are freed.
+// LumaPool: reuses the memory of luma planes. Fresh memory for each picture would cost hundreds of
+// page faults, each filled with zeros by the kernel. A plane returns to the pool when its last
+// owner releases it, on any thread, even after the pool is gone. The pool frees planes of another
+// size than the last one taken, and planes beyond kKept.
 
 #include <cstddef>
 #include <cstdint>
@@ -18,9 +17,9 @@ namespace alidade {
 
 class LumaPool {
  public:
-  static constexpr std::size_t kKept = 4;  // planes that nobody uses
+  static constexpr std::size_t kKept = 4;  // unused planes
 
-  // A plane of `size` bytes, whatever is in them.
+  // A plane of `size` bytes with undefined content.
   [[nodiscard]] std::shared_ptr<std::uint8_t> take(std::size_t size) {
     std::unique_ptr<std::uint8_t[]> plane = shelf_->take(size);
     if (plane == nullptr) plane.reset(new std::uint8_t[size]);
@@ -50,7 +49,7 @@ class LumaPool {
 
    private:
     PriorityMutex mutex_;
-    std::size_t size_ = 0;  // bytes, of each
+    std::size_t size_ = 0;  // bytes of each plane
     std::vector<std::unique_ptr<std::uint8_t[]>> planes_;
   };
 

@@ -28,15 +28,17 @@ namespace alidade {
 namespace {
 
 constexpr long kReceiveBuffer = 128 * 1024;  // bytes read at a time
-// However many bytes are awaited: what came by then is taken, should they be fewer than was told.
+// Limits the sleep for the awaited bytes, in case fewer come than announced.
 constexpr double kMostAsleep_s = 0.02;
-constexpr int kUselessInARow =
-    1000;  // parts that are no pictures; one or two before each are usual
-// Who has woken the thread so often for one picture sends it byte by byte: from then on as often as the pause allows.
+// Parts that are not pictures; one or two before each picture are usual.
+constexpr int kUselessInARow = 1000;
+// A sender that woke the thread this often for one picture sends byte by byte. From then on it is
+// woken at most once per pause.
 constexpr int kWakesForAPicture = 256;
 constexpr auto kPauseOfWakes = std::chrono::milliseconds(1);
-constexpr int kDamagedInARow = 30;  // pictures: more are no accident
-// Each part without a new time stamp that can be true makes the sender's clock more doubtful, each one with it less.
+constexpr int kDamagedInARow = 30;  // pictures: more are not an accident
+// A part without a new, plausible time stamp adds doubt of the sender's clock; each good one
+// reduces it by 1.
 constexpr int kDoubtOfABadStamp = 20;
 constexpr int kMostDoubt = 2 * kDoubtOfABadStamp;
 constexpr std::size_t kShownUrl = 120;  // bytes
@@ -96,39 +98,40 @@ class MjpegSource : public FrameSource {
   std::atomic<std::int64_t> unstamped_{0};
   Remarks remarks_;
 
-  // The receiving thread's own.
+  // Used by the receiving thread only.
   char curl_error_[CURL_ERROR_SIZE] = "";
   std::string asked_;     // the URL, after redirections
-  bool logs_in_ = false;  // there
+  bool logs_in_ = false;  // at asked_
   long methods_ = kDigest;
-  curl_socket_t socket_ = CURL_SOCKET_BAD;   // of this connection, if it is open
-  int low_water_ = 1;                        // bytes at which it wakes
-  CurlMultiPtr multi_;                       // stop() wakes it up
+  curl_socket_t socket_ = CURL_SOCKET_BAD;   // of the open connection
+  int low_water_ = 1;                        // bytes at which poll() wakes
+  CurlMultiPtr multi_;                       // stop() wakes it
   CurlEasyPtr easy_;                         // of this connection
-  std::optional<MultipartScanner> scanner_;  // of this connection, from its first bytes on
+  std::optional<MultipartScanner> scanner_;  // of this connection, created with its first bytes
   std::size_t header_bytes_ = 0;             // of this connection's answers
-  std::string refusal_;                      // why the answer's body was not taken
+  std::string refusal_;                      // why the body of the answer was rejected
   int useless_in_a_row_ = 0;                 // parts
   int wakes_ = 0;                            // since the last picture
-  std::int64_t discarded_ = 0;               // by the scanner, as far as counted
+  std::int64_t discarded_ = 0;               // discarded by the scanner, as far as counted
   std::int64_t pictures_ = 0;                // of this connection
-  bool worked_ = false;                      // a picture has come, of any connection
-  double last_picture_s_ = 0;                // or the connection's beginning
+  bool worked_ = false;                      // a picture has come on any connection
+  double last_picture_s_ = 0;                // arrival of the last picture, or start of the
+                                             // connection
 
-  // read()'s own.
+  // Used by read() only.
   std::string error_;
   bool failed_ = false;
   bool restarted_ = true;
   std::int64_t next_frame_ = 0;
   int damaged_in_a_row_ = 0;
-  int clock_doubt_ = 0;  // above kMostDoubt: none for the rest of the connection
-  std::optional<double> last_sender_time_s_;  // of this connection, as told
+  int clock_doubt_ = 0;  // above kMostDoubt: no sender time for the rest of the connection
+  std::optional<double> last_sender_time_s_;  // of this connection, unchecked
   StampGuard stamps_;
   JpegDecoder decoder_;
   CodecParametersPtr parameters_ = picture_parameters(AV_CODEC_ID_MJPEG);
   StreamCopy copy_;
 
-  // Last: its thread uses the others.
+  // Last, as its thread uses the other members.
   ReceivingThread<MultipartPart> thread_{
       options_.max_backoff_s, [this](std::string* error) { return receive_connection(error); },
       [this] { interrupt(); }};
@@ -187,7 +190,8 @@ int MjpegSource::on_socket(void* self, curl_socket_t socket, curlsocktype /*purp
   return CURL_SOCKOPT_OK;
 }
 
-// libcurl may have opened two, for a name with two addresses; a number that was closed is soon another file's.
+// libcurl may have opened two sockets for a name with two addresses. A closed number is soon that
+// of another file.
 int MjpegSource::on_close(void* self, curl_socket_t socket) {
   auto* source = static_cast<MjpegSource*>(self);
   if (socket == source->socket_) {
@@ -213,7 +217,7 @@ std::size_t MjpegSource::on_body(char* data, std::size_t size, std::size_t count
   long status = 0;
   curl_easy_getinfo(source->easy_.get(), CURLINFO_RESPONSE_CODE, &status);
   if (status != 200) {
-    return bytes;  // an error's page; the status tells more
+    return bytes;  // an error page; the status says more
   }
   if (!source->scanner_ && !source->begin_stream()) {
     return 0;  // ends the transfer with CURLE_WRITE_ERROR
@@ -265,8 +269,8 @@ void MjpegSource::take_bytes(std::string_view bytes, double arrival_s) {
   }
 }
 
-// One connection from its beginning to its end. Each logs in anew: a camera that has restarted does not know
-// the nonces it gave, and where it does not call them stale libcurl believes that the password is wrong.
+// One connection from start to end. Each logs in anew: a rebooted camera does not know its earlier
+// nonces, and if it does not call them stale, libcurl believes that the password is wrong.
 ReadStatus MjpegSource::receive_connection(std::string* error) {
   last_picture_s_ = monotonic_now_s();
   Redirection next{name_, true, ""};
@@ -289,7 +293,7 @@ ReadStatus MjpegSource::receive_connection(std::string* error) {
   return ReadStatus::kDisconnected;
 }
 
-// kOk: it has ended with this code.
+// kOk: the answer has ended with *code.
 ReadStatus MjpegSource::receive_answer(CURLcode* code, std::string* error) {
   scanner_.reset();
   refusal_.clear();
@@ -323,7 +327,8 @@ ReadStatus MjpegSource::receive_answer(CURLcode* code, std::string* error) {
   return status;
 }
 
-// A picture comes in many segments, and a thread with priority would wake for each.
+// A picture comes in many segments. Without a low-water mark, a thread with priority would wake for
+// each.
 void MjpegSource::wait_for_bytes(double left_s) {
   if (++wakes_ > kWakesForAPicture) std::this_thread::sleep_for(kPauseOfWakes);
   set_low_water(scanner_ ? scanner_->missing_bytes() : 1);
@@ -331,11 +336,11 @@ void MjpegSource::wait_for_bytes(double left_s) {
   int ready = 0;
   curl_multi_poll(multi_.get(), nullptr, 0, poll_milliseconds(most_s), &ready);
   if (ready == 0) {
-    set_low_water(1);  // libcurl, too, asks the socket before it reads
+    set_low_water(1);  // libcurl also polls the socket before it reads
   }
 }
 
-// Not by TLS, whose records need not be as long as what they carry.
+// Not for TLS: a record need not be as long as its content.
 void MjpegSource::set_low_water(std::size_t bytes) {
   const auto wanted = static_cast<int>(std::min<std::size_t>(bytes, INT_MAX));
   if (is_by_tls() || socket_ == CURL_SOCKET_BAD || wanted == low_water_) {
@@ -395,7 +400,7 @@ ReadStatus MjpegSource::read(Frame& frame, double timeout_s) {
   }
 }
 
-// Turns a part into the frame; kTimeout if that cannot be done with this one.
+// Makes a frame from a part; kTimeout if this part gives none.
 ReadStatus MjpegSource::deliver(MultipartPart part, Frame& frame) {
   Picture picture;
   const double before_s = monotonic_now_s();

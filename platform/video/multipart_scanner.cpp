@@ -8,12 +8,13 @@
 namespace alidade {
 namespace {
 
-constexpr std::size_t kMaxBoundary = 200;      // bytes of a line; RFC 2046 allows a boundary 70
+constexpr std::size_t kMaxBoundary = 200;      // bytes of a line; RFC 2046 permits a boundary of 70
 constexpr std::size_t kMaxHeaders = 8192;      // bytes of one part's headers
 constexpr int kMaxHeaderLines = 64;            // of one part
-constexpr std::size_t kMaxDashes = 32;         // before a boundary, with the line end before them
+constexpr std::size_t kMaxDashes = 32;         // before a boundary, including the line end before
+                                               // them
 constexpr std::size_t kMaxDelimiterTail = 32;  // dashes and blanks between boundary and line end
-constexpr std::size_t kMaxName = 32;  // bytes of a header's name that follows a boundary at once
+constexpr std::size_t kMaxName = 32;           // bytes of a header name directly behind a boundary
 constexpr const char* kHeaderBlanks = " \t\r\n";
 
 char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
@@ -32,15 +33,15 @@ std::string_view stripped(std::string_view text, const char* what) {
   return text.substr(first, text.find_last_not_of(what) - first + 1);
 }
 
-// The boundary without the dashes around it; empty if it is none: a boundary is printable, and so cannot be
-// taken for the end of a picture.
+// The boundary without the dashes around it; empty if it is not printable. A printable one cannot
+// be taken for the end of a picture.
 std::string core_of(std::string_view boundary) {
   const bool printable =
       std::all_of(boundary.begin(), boundary.end(), [](char c) { return c >= ' ' && c <= '~'; });
   return std::string(printable ? stripped(boundary, "-") : std::string_view());
 }
 
-// Digits only; empty if it is no such number or too large to matter.
+// Digits only; nullopt if it is not such a number or too large to matter.
 std::optional<std::size_t> parse_length(std::string_view text, std::size_t max) {
   if (text.empty()) {
     return std::nullopt;
@@ -68,10 +69,10 @@ std::optional<double> parse_seconds(std::string_view text) {
   return value;
 }
 
-// What stands directly behind a boundary, without a line end.
+// What comes directly after a boundary, without a line end.
 enum class Follows { kNothing, kPart, kUnknown };
 
-// kPart: a header, or a JPEG. kUnknown: more bytes must come to tell.
+// kPart: a header or a JPEG. kUnknown: more bytes are needed.
 Follows what_follows(std::string_view bytes) {
   if (bytes.empty()) return Follows::kUnknown;
   if (bytes[0] == '\xFF') {
@@ -88,7 +89,7 @@ Follows what_follows(std::string_view bytes) {
   return Follows::kNothing;
 }
 
-// Where the first header begins in a line like "--boundaryContent-Type: image/jpeg"; npos: nowhere.
+// Start of the first header in a line like "--boundaryContent-Type: image/jpeg"; npos: none.
 std::size_t header_behind_boundary(std::string_view line) {
   const std::string small = lower(line);
   return std::min(small.find("content-"), small.find("x-timestamp:"));
@@ -160,7 +161,7 @@ std::size_t MultipartScanner::missing_bytes() const {
   return known && *content_length_ > pending_bytes() ? *content_length_ - pending_bytes() : 1;
 }
 
-// False when nothing can be done before more bytes come.
+// False: more bytes are needed.
 bool MultipartScanner::advance() {
   switch (state_) {
     case State::kLearnBoundary:
@@ -184,7 +185,7 @@ bool MultipartScanner::learn_boundary() {
   const std::size_t end = rest().find('\n');
   if (end == std::string::npos) {
     if (pending_bytes() > kMaxBoundary) {
-      buffer_.assign(kMaxBoundary, ' ');  // no boundary; only its line end is still of interest
+      buffer_.assign(kMaxBoundary, ' ');  // not a boundary; only its line end still matters
       used_ = 0;
     }
     return false;
@@ -201,7 +202,7 @@ bool MultipartScanner::learn_boundary() {
   return true;
 }
 
-// Moves scan_ on as far as it can decide.
+// Advances scan_ as far as it can decide.
 std::optional<MultipartScanner::Delimiter> MultipartScanner::find_delimiter() {
   const std::string_view bytes = rest();
   for (;;) {
@@ -223,7 +224,7 @@ std::optional<MultipartScanner::Delimiter> MultipartScanner::find_delimiter() {
       ++end;
     }
     if (end == bytes.size()) {
-      return std::nullopt;  // the line may go on
+      return std::nullopt;  // the line may continue
     }
     const bool dashed = at - begin >= 2;
     const bool ends_line = bytes[end] == '\n' && (at_line_start || dashed);
@@ -262,7 +263,7 @@ bool MultipartScanner::skip_to_delimiter() {
     begin_part(delimiter->end);
     return true;
   }
-  // What stands before scan_ is of no use, but for the dashes and the line end before a boundary.
+  // Bytes before scan_ are useless, except the dashes and the line end before a boundary.
   const std::size_t kept = std::min(scan_, kMaxDelimiterTail);
   drop_front(scan_ - kept);
   return false;
@@ -285,7 +286,7 @@ bool MultipartScanner::read_header_line() {
     return false;
   }
   const std::string line(stripped(bytes.substr(0, end), kHeaderBlanks));
-  if (stripped(line, "-") == core_) {  // the part had no body
+  if (stripped(line, "-") == core_) {  // the part has no body
     begin_part(end + 1);
     return true;
   }
@@ -325,7 +326,7 @@ bool MultipartScanner::read_body() {
     end_part(*content_length_);
     return true;
   }
-  // Without a delimiter the last bytes may be the beginning of one.
+  // Without a delimiter, the last bytes may be the start of one.
   const std::size_t not_body =
       delimiter ? 0 : kMaxDashes + core_.size() + kMaxDelimiterTail + kMaxName;
   if (known_end > max_part_bytes_ + not_body) {
@@ -341,7 +342,7 @@ bool MultipartScanner::read_body() {
   return true;
 }
 
-// What follows is skipped up to the delimiter.
+// The rest is skipped up to the delimiter.
 void MultipartScanner::end_part(std::size_t body_end) {
   part_.body = rest().substr(0, body_end);
   drop_front(body_end);

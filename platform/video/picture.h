@@ -1,5 +1,5 @@
 #pragma once
-// A decoded picture's luma plane. Whoever holds `owner` holds the plane.
+// The luma plane of a decoded picture. Holding `owner` keeps the plane alive.
 
 #include <cstddef>
 #include <cstdint>
@@ -14,10 +14,10 @@ struct Picture {
 
   int width = 0;                       // px
   int height = 0;                      // px
-  const std::uint8_t* luma = nullptr;  // row v at luma + v * stride
+  const std::uint8_t* luma = nullptr;  // row v starts at luma + v * stride
   std::ptrdiff_t stride = 0;           // bytes
-  std::int64_t pts = kNoPts;           // of the packet it came from
-  bool interlaced = false;             // coded as two fields, or of a frame's two fields
+  std::int64_t pts = kNoPts;           // of the packet it was decoded from
+  bool interlaced = false;             // coded as two fields, or as one frame of two fields
   std::shared_ptr<const void> owner;
 };
 

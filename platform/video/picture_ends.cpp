@@ -58,8 +58,8 @@ PictureEnds::Piece PictureEnds::piece_out(std::int64_t pts) {
   return {complete && !markers_within_, picture->capture_utc_s};
 }
 
-// The last packet that came is not the picture's last for sure: neither is it marked, nor did the next picture's first
-// come behind it.
+// True unless the last packet is certainly the picture's last: it is marked, or the next picture's
+// first packet follows it.
 bool PictureEnds::lost_its_end(const Picture& picture) const {
   if (picture.last_is_marked && !markers_within_) return false;
   const auto next = static_cast<std::uint16_t>(picture.last + 1U);
@@ -68,8 +68,8 @@ bool PictureEnds::lost_its_end(const Picture& picture) const {
   });
 }
 
-// What came in order between the picture asked about before and this one is of a kind that libavformat has no use for, as
-// packets that repair others: it is not lost.
+// Packets that came in order between the previous picture and this one are not lost: libavformat
+// has no use for them, as for repair packets.
 bool PictureEnds::lost_before(const Picture& picture) const {
   if (!next_sequence_) return false;
   const auto behind_the_last = [this](std::uint16_t sequence) {
@@ -88,7 +88,8 @@ PictureEnds::Loss PictureEnds::loss_of(std::int64_t pts) {
   Picture* const picture = find_piece(pts);
   if (picture == nullptr || picture->new_packets == 0) return {true, true};
   const int span = static_cast<std::uint16_t>(picture->last - picture->first) + 1;
-  // libavformat drops what comes too late; what came in order and gave no piece, it had no use for.
+  // libavformat drops packets that come too late. Packets that came in order without a piece were
+  // of no use to it.
   const bool given_out = picture->new_pieces == picture->new_packets || !picture->late;
   const Loss loss{span != picture->new_packets || !given_out || lost_its_end(*picture),
                   lost_before(*picture)};

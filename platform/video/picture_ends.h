@@ -1,14 +1,13 @@
 #pragma once
-// PictureEnds: which piece of a picture is its last, whether any was lost, and when the picture was taken.
+// PictureEnds: finds the last piece of each picture, losses, and capture times.
 //
-// libavformat puts RTP packets in order and gives out each one's piece of an H.264 or H.265 picture, but not
-// the marker that ends the picture; without it, only the next picture's first packet shows the end,
-// one period late. So the headers of the packets that go in are noted here, and the pieces that come
-// out are counted: a picture whose packets arrived in order up to its marker is complete when as many
-// pieces came out. After a loss or a reordering, and always with a sender that sets markers within
-// pictures, this says nothing, and the next picture's beginning is the end.
-// What is lost, libavformat does not tell either: the sequence numbers of a picture's packets do.
-// Fixed memory. One thread at a time.
+// libavformat sorts RTP packets and returns the piece of an H.264 or H.265 picture in each. It does
+// not return the marker that ends the picture, without which the end shows only with the next
+// picture's first packet, one period late. So this class notes the headers of incoming packets and
+// counts the pieces that come out. A picture whose packets came in order up to its marker is
+// complete when as many pieces came out. After a loss or reordering, and for a sender that sets
+// markers within pictures, the end is the start of the next picture. Losses show in the sequence
+// numbers. Fixed memory. One thread at a time.
 
 #include <array>
 #include <cstddef>
@@ -21,23 +20,26 @@ namespace alidade {
 
 class PictureEnds {
  public:
-  // A packet that libavformat takes in.
+  // Call it for each packet that goes into libavformat.
   void packet_in(const RtpHeader& header);
 
   struct Piece {
-    bool last = false;                    // of its picture, for sure
-    std::optional<double> capture_utc_s;  // the picture's, by the extension of a packet so far
+    bool last = false;                    // certainly the last piece of its picture
+    std::optional<double> capture_utc_s;  // of the picture, if an extension in one of its packets
+                                          // so far gives it
   };
 
-  // A piece that libavformat gave out, with its time stamp: ticks, unwrapped, from another zero.
+  // Call it for each piece that comes out, with its time stamp: ticks, unwrapped, with another
+  // zero.
   [[nodiscard]] Piece piece_out(std::int64_t pts);
 
   struct Loss {
-    bool within = false;  // of the picture, or it is not known
-    bool before = false;  // between it and the picture before
+    bool within = false;  // within the picture, or unknown
+    bool before = false;  // between it and the previous picture
   };
 
-  // Of the picture with this time stamp, all of whose pieces that will come were given out. Of each picture once, in order.
+  // Losses of the picture with this time stamp, after its last piece came out. Call it once per
+  // picture, in order.
   [[nodiscard]] Loss loss_of(std::int64_t pts);
 
  private:
@@ -45,10 +47,10 @@ class PictureEnds {
     std::uint32_t timestamp = 0;
     int packets = 0;
     int pieces = 0;
-    bool in_order = false;  // all its packets so far, from the one after another's marker on
-    bool ended = false;     // its marker came
-    bool late = false;      // one of its packets came behind one that follows it
-    // What loss_of() has not been asked about.
+    bool in_order = false;  // all packets so far, starting after another picture's marker
+    bool ended = false;     // its marker has come
+    bool late = false;      // a packet came after one that follows it
+    // Since the last call of loss_of() for this picture.
     std::uint16_t first = 0;  // sequence numbers
     std::uint16_t last = 0;
     bool last_is_marked = false;
@@ -62,13 +64,13 @@ class PictureEnds {
   [[nodiscard]] bool lost_before(const Picture& picture) const;
   [[nodiscard]] Picture* find_piece(std::int64_t pts);
 
-  std::array<Picture, 16> pictures_;  // the latest; more than wait in libavformat for a late packet
+  std::array<Picture, 16> pictures_;  // the latest; more than can wait in libavformat for a late
+                                      // packet
   std::size_t latest_ = 0;
   std::optional<RtpHeader> last_;
-  bool markers_within_ = false;        // this sender's markers mean nothing
-  std::optional<std::uint32_t> zero_;  // timestamp of pts 0
-  std::optional<std::uint16_t>
-      next_sequence_;  // of the first packet behind the picture asked about last
+  bool markers_within_ = false;                 // this sender's markers do not mark ends
+  std::optional<std::uint32_t> zero_;           // timestamp that corresponds to pts 0
+  std::optional<std::uint16_t> next_sequence_;  // first one after the picture of the last loss_of()
 };
 
 }  // namespace alidade

@@ -1,5 +1,6 @@
 #pragma once
-// One picture in a file of its own: read from what libav decodes (PNG, JPEG, PGM, ...), written as a grey PNG. Allocates. No shared state.
+// One picture in a file: reads what libav decodes (PNG, JPEG, PGM, ...), writes grey PNG.
+// Allocates. No shared state.
 
 #include <cstddef>
 #include <cstdint>
@@ -9,10 +10,11 @@
 
 namespace alidade {
 
-// The first picture of the file. False leaves one line in *error: path: what is wrong.
+// Reads the first picture of the file. On false, *error is one line: path: what is wrong.
 [[nodiscard]] bool read_picture_file(const std::string& path, Picture* picture, std::string* error);
 
-// The bytes of a PNG of 8-bit luma, row v at luma + v * stride; empty: libav has no encoder for it, or not this size.
+// A PNG of 8-bit luma, row v at luma + v * stride. Empty: libav has no PNG encoder, or not for this
+// size.
 [[nodiscard]] std::string grey_png(const std::uint8_t* luma, int width, int height,
                                    std::ptrdiff_t stride);
 

@@ -1,11 +1,8 @@
 #pragma once
-// ReceivingThread: what every source that receives over a network has in common: a thread that connects
-// again and again with back-off, and a bounded queue in which its pictures, and the reports of
-// connections lost, wait for read().
-//
-// Of Picture it only needs that it can be moved. When the reader is too slow, the oldest pictures are
-// dropped and counted; of reports that then follow each other the last one stays, so memory is bounded
-// whoever reads.
+// ReceivingThread: common to all sources that receive over a network: a thread that reconnects with
+// back-off, and a bounded queue of pictures and reports of lost connections for read(). Picture
+// need only be movable. If the reader is too slow, the oldest pictures are dropped and counted. Of
+// consecutive reports only the last is kept. So memory is bounded even if nobody reads.
 
 #include <algorithm>
 #include <atomic>
@@ -29,9 +26,9 @@ template <class Picture>
 class ReceivingThread {
  public:
   static constexpr std::size_t kMaxPictures = 32;       // a second of video
-  static constexpr std::size_t kMaxBytes = 24U << 20U;  // of the pictures that wait
+  static constexpr std::size_t kMaxBytes = 24U << 20U;  // bytes of all waiting pictures
 
-  // Lives through one connection, on the receiving thread: calls push(), and returns why it ended:
+  // Runs one connection on the receiving thread: calls push() and returns why it ended:
   // kDisconnected or kFailed with *error, or kStopped. interrupt ends it, from any thread.
   using Connection = std::function<ReadStatus(std::string* error)>;
 
@@ -58,11 +55,12 @@ class ReceivingThread {
     interrupt_();
   }
   [[nodiscard]] bool stopped() const { return stopped_; }
-  // For the connection: whether it is to end.
+  // For the connection: true if it is to end.
   [[nodiscard]] bool ending() const { return stopped_ || refused_; }
 
-  // For read()'s thread: what the connection brings is of no use, for this reason, which next() will report. It ends, what
-  // waits goes, and the pauses before the next ones grow as long as each brings the like.
+  // For read()'s thread: the connection's content is useless, for this reason, which next() will
+  // report. Ends the connection and clears the queue. The pauses grow as long as each new
+  // connection is refused, too.
   void refuse(std::string reason) {
     {
       const std::lock_guard<std::mutex> lock(mutex_);
@@ -76,8 +74,8 @@ class ReceivingThread {
   }
   [[nodiscard]] std::int64_t dropped() const { return dropped_; }
 
-  // For read(): the next picture (kOk) or report, at the latest by `deadline`. The first call starts the
-  // thread, and so with the caller's scheduling.
+  // For read(): the next picture (kOk) or report, at the latest at `deadline`. The first call
+  // starts the thread, which inherits the caller's scheduling.
   [[nodiscard]] ReadStatus next(std::chrono::steady_clock::time_point deadline, Picture* picture,
                                 std::string* error) {
     if (!thread_.joinable() && !stopped_) {
@@ -100,7 +98,7 @@ class ReceivingThread {
     return event.status;
   }
 
-  // For the connection: a picture of so many bytes has come.
+  // For the connection: queues a picture of this size.
   void push(Picture picture, std::size_t bytes) {
     {
       const std::lock_guard<std::mutex> lock(mutex_);
@@ -116,13 +114,13 @@ class ReceivingThread {
     changed_.notify_all();
   }
 
-  // For the connection: whether the next picture, of so many bytes, would push another one out.
+  // For the connection: true if the next picture, of this size, would drop another one.
   [[nodiscard]] bool full(std::size_t bytes) {
     const std::lock_guard<std::mutex> lock(mutex_);
     return pictures_ > 0 && (pictures_ >= kMaxPictures || bytes_ + bytes > kMaxBytes);
   }
 
-  // For the connection: drops the pictures that wait.
+  // For the connection: drops all waiting pictures.
   void drop_all() {
     const std::lock_guard<std::mutex> lock(mutex_);
     while (pictures_ > 0) {
@@ -178,7 +176,7 @@ class ReceivingThread {
       }
       const bool failed = event.status == ReadStatus::kFailed;
       if (!queue_.empty() && queue_.back().status != ReadStatus::kOk) {
-        queue_.pop_back();  // nobody reads: the last report is enough
+        queue_.pop_back();  // nobody reads: keep only the last report
       }
       queue_.push_back(std::move(event));
       changed_.notify_all();
@@ -198,13 +196,14 @@ class ReceivingThread {
   std::deque<Event> queue_;           // guarded by mutex_
   std::size_t pictures_ = 0;          // guarded by mutex_
   std::size_t bytes_ = 0;             // guarded by mutex_
-  bool accepted_ = false;             // guarded by mutex_; the last picture, unless it is refused
-  bool distrusted_ = false;           // guarded by mutex_; since a refusal nothing was accepted
+  bool accepted_ = false;             // guarded by mutex_; the last picture was taken and not
+                                      // refused so far
+  bool distrusted_ = false;           // guarded by mutex_; nothing was accepted since a refusal
   std::string refusal_;               // guarded by mutex_
-  std::atomic<bool> refused_{false};  // set under mutex_: the connection
+  std::atomic<bool> refused_{false};  // set under mutex_; the current connection was refused
   std::atomic<bool> stopped_{false};  // set under mutex_, read anywhere
   std::atomic<std::int64_t> dropped_{0};
-  std::thread thread_;  // read()'s own
+  std::thread thread_;  // used by read() only
 };
 
 }  // namespace alidade

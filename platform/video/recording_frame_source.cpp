@@ -67,8 +67,8 @@ class FramesOnDisk : public RecordingFrameSource {
   RecordingInfo info_;
   std::vector<FrameStamp> stamps_;
   NextFrame next_frame_ = &FramesOnDisk::next_stamp;
-  std::size_t row_ = 0;         // the first row of stamps_ that is neither delivered nor skipped
-  std::optional<Frame> ready_;  // decoded, waiting until it is due
+  std::size_t row_ = 0;         // first row of stamps_ that is neither delivered nor skipped
+  std::optional<Frame> ready_;  // decoded, but not due yet
   std::int64_t damaged_ = 0;
   LumaDecoder decoder_;
 
@@ -76,12 +76,12 @@ class FramesOnDisk : public RecordingFrameSource {
   AvFile video_;
   bool drained_ = false;
   std::int64_t packets_ = 0;
-  std::set<std::int64_t> in_decoder_;  // timestamps of packets whose picture has not come
+  std::set<std::int64_t> in_decoder_;  // timestamps of packets whose picture has not come out yet
   std::int64_t last_pts_ = AV_NOPTS_VALUE;
-  bool has_b_frames_ = false;      // a packet came behind one whose picture was taken later
-  bool order_is_checked_ = false;  // and found right
+  bool has_b_frames_ = false;      // a packet came after one whose picture was taken later
+  bool order_is_checked_ = false;  // checked, and right
 
-  bool interlaced_ = false;  // the coding of one of the pictures
+  bool interlaced_ = false;  // one of the pictures is coded as two fields
 
   // frames/
   AVCodecID image_codec_ = AV_CODEC_ID_NONE;
@@ -132,7 +132,8 @@ ReadStatus FramesOnDisk::next_stamp(Frame* frame) {
   return ReadStatus::kOk;
 }
 
-// Gives the decoder one more packet, at the end of the file once nothing; false: it had that already.
+// Feeds the decoder one more packet, or at the end of the file the end. False: it had the end
+// already.
 bool FramesOnDisk::feed_decoder() {
   if (drained_) {
     return false;
@@ -147,16 +148,17 @@ bool FramesOnDisk::feed_decoder() {
     packet->pts = packets_;
   }
   ++packets_;
-  // The first one's is the least there is.
+  // For the first packet last_pts_ is the least value.
   has_b_frames_ = has_b_frames_ || packet->pts < last_pts_;
   last_pts_ = packet->pts;
   in_decoder_.insert(packet->pts);
-  (void)decoder_.send(packet.get());  // an undecodable one is noticed when the next picture comes
+  (void)decoder_.send(packet.get());  // failure shows when the next picture comes
   return true;
 }
 
-// Of a video with B-frames: rows that were written as packets came are not those of the pictures in the order in which they
-// were taken. Their sender_time_s then steps back, by less than that of a sender that began anew.
+// For a video with B-frames. Rows written in order of arrival do not belong to the pictures in
+// order of capture. Their sender_time_s then steps back, by less than at a restart of the sender's
+// clock.
 bool FramesOnDisk::rows_are_in_order() {
   constexpr double kMostReordering_s = 1;
   const auto steps_back = [](const FrameStamp& a, const FrameStamp& b) {
@@ -187,8 +189,8 @@ std::vector<std::string> FramesOnDisk::remarks() const {
   return remarks;
 }
 
-// A decoder gives pictures in the order of their timestamps, so a picture's place is the number of
-// packets with an earlier one, also after some that gave no picture.
+// A decoder returns pictures in the order of their timestamps. So a picture's index is the number
+// of packets with an earlier timestamp, even if some gave no picture.
 ReadStatus FramesOnDisk::next_in_video(Frame* frame) {
   for (;;) {
     Picture picture;
@@ -235,7 +237,7 @@ ReadStatus FramesOnDisk::next_image(Frame* frame) {
       const std::shared_ptr<AVCodecParameters> parameters(avcodec_parameters_alloc(), AvDeleter());
       parameters->codec_type = AVMEDIA_TYPE_VIDEO;
       parameters->codec_id = type->codec;
-      // Of pictures each by itself none is held back.
+      // Independently coded pictures: none is held back.
       if (!decoder_.open(*parameters, false)) {
         return fail(path + type->extension + ": " + decoder_.error());
       }
@@ -247,7 +249,7 @@ ReadStatus FramesOnDisk::next_image(Frame* frame) {
     LumaDecoder::Result result = LumaDecoder::Result::kNone;
     if (av_new_packet(packet.get(), static_cast<int>(bytes.size())) == 0) {
       std::copy(bytes.begin(), bytes.end(), packet->data);
-      // Without it the PNG decoder adds each picture to the one before.
+      // Without this flag the PNG decoder adds each picture to the one before.
       packet->flags |= AV_PKT_FLAG_KEY;
       if (!bytes.empty() && decoder_.send(packet.get())) {
         result = decoder_.receive(&picture);

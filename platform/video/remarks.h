@@ -1,6 +1,5 @@
 #pragma once
-// Remarks: what a source has to say about its stream besides losses, each kind once in its life.
-// Thread-safe.
+// Remarks: notes of a source on its stream besides losses, each kind once. Thread-safe.
 
 #include <cstdio>
 #include <deque>
@@ -18,7 +17,7 @@ class Remarks {
     if (said_.insert(kind).second) new_.push_back(std::move(text));
   }
 
-  // The next that was not taken yet; empty: none.
+  // The next note not taken yet; empty: none.
   [[nodiscard]] std::string take() {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (new_.empty()) return "";
@@ -33,7 +32,7 @@ class Remarks {
   std::deque<std::string> new_;
 };
 
-// Of a stamp that cannot be true, by so much.
+// For a time stamp that cannot be true and is off by off_s.
 [[nodiscard]] inline std::string bad_stamp_remark(double off_s) {
   char text[192];
   std::snprintf(

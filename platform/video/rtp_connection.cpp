@@ -22,10 +22,10 @@ extern "C" {
 namespace alidade {
 namespace {
 
-constexpr int kMaxPacket = 65'536;       // bytes: RTSP's and UDP's lengths have 16 bits
-constexpr int kMaxDescription = 16'384;  // bytes that libavformat reads
+constexpr int kMaxPacket = 65'536;       // bytes: RTSP and UDP have 16-bit lengths
+constexpr int kMaxDescription = 16'384;  // bytes of the SDP that libavformat reads
 
-// The description that a sender of plain RTP does not send.
+// The session description for plain RTP, where the sender gives none.
 std::string sdp_of(const Url& url, const std::string& format) {
   const bool jpeg = format == "MJPG";
   return "v=0\nc=IN IP4 " + url.host + "\nt=0 0\nm=video " + url.port + " RTP/AVP " +
@@ -87,7 +87,7 @@ RtpConnection::~RtpConnection() { avformat_close_input(&format_); }
 
 ReadStatus RtpConnection::nothing_received(std::string* error) const {
   char text[128];
-  // The same words each time, so that a log need not repeat them.
+  // The same text each time, so that a log need not repeat it.
   std::snprintf(text, sizeof text,
                 arrival_s_ > last_picture_s_ ? "packets came, but no whole picture for %g s"
                                              : "nothing received for %g s",
@@ -122,16 +122,16 @@ ReadStatus RtpConnection::open_demuxer(const std::string& sdp, std::string* erro
     return ReadStatus::kFailed;
   }
   format_->flags |= AVFMT_FLAG_NOPARSE | AVFMT_FLAG_NOFILLIN;
-  // With a second stream libavformat would begin to rewrite timestamps at the first RTCP report.
+  // With a second stream libavformat would rewrite timestamps at the first RTCP report.
   format_->max_streams = 1;
-  format_->max_delay = 20'000;  // us that a gap of UDP packets is waited for
+  format_->max_delay = 20'000;  // us; wait for the packets of a gap in UDP
   Text text{sdp};
   const IoPtr description(make_io(kMaxDescription, &text, &read_description));
   format_->pb = description.get();
   AVDictionary* dictionary = nullptr;
   av_dict_set(&dictionary, "sdp_flags", "custom_io", 0);
   av_dict_set(&dictionary, "allowed_media_types", "video", 0);
-  // Within a connection nothing comes out of order.
+  // Over TCP nothing comes out of order.
   const bool by_rtsp =
       options_.url.rfind("rtsp://", 0) == 0 || options_.url.rfind("rtsps://", 0) == 0;
   const bool by_tcp = by_rtsp && options_.transport == RtpSourceOptions::Transport::kTcp;
@@ -144,8 +144,8 @@ ReadStatus RtpConnection::open_demuxer(const std::string& sdp, std::string* erro
   }
   const std::optional<VideoDescription> video = find_video(sdp);
   filter_ = StreamFilter(video ? video->payload_type : -1, transport_->agreed_source());
-  // libavformat writes its receiver reports there, too: `direct` keeps them out of the buffer, and no
-  // write function means nowhere.
+  // libavformat also writes its receiver reports there. `direct` keeps them out of the buffer;
+  // without a write function they are discarded.
   packets_.reset(make_io(2 * kMaxPacket, this, &RtpConnection::next_packet));
   packets_->max_packet_size = kMaxPacket;
   packets_->direct = AVIO_FLAG_DIRECT;
@@ -154,7 +154,7 @@ ReadStatus RtpConnection::open_demuxer(const std::string& sdp, std::string* erro
   return prepare(error);
 }
 
-// libavformat asks for a packet.
+// Called by libavformat for the next packet.
 int RtpConnection::next_packet(void* self, std::uint8_t* data, int capacity) {
   auto* connection = static_cast<RtpConnection*>(self);
   ReceivedPacket packet;
@@ -166,7 +166,7 @@ int RtpConnection::next_packet(void* self, std::uint8_t* data, int capacity) {
       connection->arrival_s_ = packet.arrival_s;
       break;
     }
-    // Where packets come without end, no wait does.
+    // If packets come without end, no wait in receive() detects the timeout.
     connection->transport_status_ =
         monotonic_now_s() > deadline_s
             ? ReadStatus::kTimeout
@@ -185,7 +185,7 @@ int RtpConnection::next_packet(void* self, std::uint8_t* data, int capacity) {
   return static_cast<int>(packet.size);
 }
 
-// What can be read of the stream that was found.
+// Checks the found stream and prepares its parser.
 ReadStatus RtpConnection::prepare(std::string* error) {
   if (format_->nb_streams == 0) {
     *error = "there is no video in this stream";
@@ -258,7 +258,7 @@ ReadStatus RtpConnection::read_picture(AccessUnit* unit, std::string* error) {
   return ReadStatus::kOk;
 }
 
-// Adds the piece to the picture that is growing. False: too large.
+// Adds the piece to the growing picture. False: too large.
 bool RtpConnection::append(AccessUnit* piece) {
   if (!growing_.packet) {
     growing_ = std::move(*piece);
@@ -295,11 +295,11 @@ ReadStatus RtpConnection::read(AccessUnit* unit, std::string* error) {
   return ReadStatus::kOk;
 }
 
-// Finds key frames and losses; false for a B-frame. B-slices of H.265 may be without one: what counts is that they are to
-// be seen before a picture that came earlier.
+// Finds key frames and losses; false for a B-frame. H.265 may have B-slices without reordering.
+// There only a picture that is shown before an earlier one counts.
 bool RtpConnection::inspect(AccessUnit* unit) {
   unit->key = true;
-  bool at_once = true;  // nothing of what comes then is coded from what came before
+  bool at_once = true;  // no later picture depends on earlier ones
   if (coded_by_) {
     const AVPacket& packet = *unit->packet;
     const std::size_t bytes = static_cast<std::size_t>(packet.size);
@@ -327,7 +327,7 @@ bool RtpConnection::inspect(AccessUnit* unit) {
   return true;
 }
 
-// By the whole blocks, too, of which a forged picture may show the least part.
+// Also by the whole blocks: a forged picture may show only a tiny part of them.
 void RtpConnection::judge_size(AccessUnit* unit) const {
   constexpr std::int64_t kBlock = 64;  // px, H.265's largest
   const auto pixels = [](int width, int height) { return std::int64_t{width} * height; };
@@ -342,10 +342,10 @@ void RtpConnection::judge_size(AccessUnit* unit) const {
   unit->too_large = pixels(unit->width, unit->height) > options_.max_pixels;
 }
 
-// libavformat adds to each packet what the latest RTCP report says about its timestamp, but without
-// unwrapping: between a wrap and the next report the time is one wrap (13 h) off, which shows as long as
-// the camera's clock and ours agree to some minutes. A sender without a clock reports 0, or the time
-// since it began: the high bit of NTP's seconds is not set (RFC 3550, 6.4.1).
+// libavformat gives each packet the UTC of its timestamp by the latest RTCP report, but without
+// unwrapping: between a wrap and the next report it is one wrap (13 h) off. That shows if the
+// camera's clock and ours agree within some minutes. A sender without a clock reports 0 or the time
+// since it started; the high bit of its NTP seconds is not set (RFC 3550, 6.4.1).
 std::optional<double> RtpConnection::utc(const AVPacket& packet) const {
   const auto* reference = reinterpret_cast<const AVProducerReferenceTime*>(
       av_packet_get_side_data(&packet, AV_PKT_DATA_PRFT, nullptr));
@@ -362,10 +362,10 @@ std::optional<double> RtpConnection::utc(const AVPacket& packet) const {
   return std::abs(ahead_s - wraps * wrap_s) < kAgreement_s ? utc_s - wraps * wrap_s : utc_s;
 }
 
-// Stamps the picture, if its stamp can be true. Another sender on the same port begins anew with all: libavformat's view of the
-// clock must, too.
+// Stamps the picture if its stamp can be true. True: another sender on the same port started anew,
+// so libavformat's clock must be restarted, too.
 bool RtpConnection::another_sender(AccessUnit* unit) {
-  // libavformat unwraps from one stamp to the next, which wild ones mislead by whole wraps.
+  // libavformat unwraps from stamp to stamp; wild stamps mislead it by whole wraps.
   const double tick_s = av_q2d(format_->streams[0]->time_base);
   const double wrap_s = 4294967296.0 * tick_s;
   const double told_s = static_cast<double>(unit->packet->pts) * tick_s;

@@ -1,13 +1,13 @@
 #pragma once
-// RtpConnection: one connection to an RTSP or RTP sender: whole compressed pictures with their stamps.
-// Part of RtpSource, which reconnects, queues and decodes.
+// RtpConnection: one connection to an RTSP or RTP sender; returns whole compressed pictures with
+// their stamps. Part of RtpSource, which reconnects, queues and decodes.
 //
-// A transport brings the packets, libavformat takes them apart (its SDP demuxer with custom I/O).
-// libavformat's parser is switched off: it gives a picture out, and so stamps it, only with the next
-// one's first packet. Pieces of one RTP timestamp are put together here instead, up to the picture's
-// marker (picture_ends.h). H.264 and H.265 alike.
-// Blocks; a wait ends with interrupt() or after timeout_s without a whole picture: reports of a camera
-// whose encoder hangs, or packets of another stream, are no sign of life.
+// A transport receives the packets; libavformat unpacks them (its SDP demuxer with custom I/O). Its
+// parser is off, because it returns, and so stamps, a picture only with the first packet of the
+// next. Instead, pieces with the same RTP timestamp are joined here up to the picture's marker
+// (picture_ends.h). Blocks. A wait ends with interrupt(), or after timeout_s without a whole
+// picture: RTCP reports of a camera with a hanging encoder, or packets of another stream, are no
+// sign of life.
 
 #include <cstdint>
 #include <memory>
@@ -27,31 +27,31 @@ namespace alidade {
 struct AccessUnit {
   PacketPtr packet;                     // one whole picture
   double receive_time_s = 0;            // CLOCK_MONOTONIC
-  std::optional<double> sender_time_s;  // none: not told, or it cannot be true
+  std::optional<double> sender_time_s;  // nullopt: not given, or cannot be true
   std::optional<double> sender_utc_s;
-  bool begins_anew = false;  // the sender's clock, with this one
-  bool key = false;          // decoding can begin with it: a key frame or a recovery point
-  bool whole = true;         // nothing of it was lost
-  bool follows = true;       // nothing was lost between it and the picture before
-  // H.264 and H.265, as its parameter sets say; 0: unknown.
+  bool begins_anew = false;  // the sender's clock starts anew with this picture
+  bool key = false;          // decoding can start here: key frame or recovery point
+  bool whole = true;         // no loss within it
+  bool follows = true;       // no loss between it and the previous picture
+  // px; H.264 and H.265, from the parameter sets; 0: unknown.
   int width = 0;
   int height = 0;
-  bool too_large = false;  // for RtpSourceOptions::max_pixels
+  bool too_large = false;  // larger than RtpSourceOptions::max_pixels
 };
 
 class RtpConnection {
  public:
-  // options.url without credentials; options must outlive the connection.
+  // options.url must be without credentials. options must outlive the connection.
   explicit RtpConnection(const RtpSourceOptions& options);
   ~RtpConnection();
   RtpConnection(const RtpConnection&) = delete;
   RtpConnection& operator=(const RtpConnection&) = delete;
 
-  // kOk, kDisconnected or kFailed; then *error is one line without URL and password. kStopped.
+  // kOk, kStopped, or kDisconnected or kFailed with *error: one line without URL and password.
   [[nodiscard]] ReadStatus open(std::string* error);
   [[nodiscard]] ReadStatus read(AccessUnit* unit, std::string* error);
 
-  // Thread-safe. Ends a wait, for good.
+  // Thread-safe. Ends a wait; all later waits end at once.
   void interrupt() { transport_->interrupt(); }
 
   // Of the open connection.
@@ -59,9 +59,10 @@ class RtpConnection {
     return parameters_;
   }
 
-  // Pieces that arrived damaged and were left out.
+  // Damaged pieces that were left out.
   [[nodiscard]] std::int64_t damaged() const { return damaged_; }
-  // Packets that the session has not agreed upon, or that are not its sender's; and what the last are.
+  // Packets that are not of the agreed session or not from its sender, and the kind of the last
+  // one.
   [[nodiscard]] std::int64_t foreign() const {
     return filter_.foreign() + (transport_ ? transport_->foreign() : 0);
   }
@@ -89,30 +90,30 @@ class RtpConnection {
   ReadStatus nothing_received(std::string* error) const;
 
   const RtpSourceOptions& options_;
-  std::string no_transport_;  // why, if it is null
+  std::string no_transport_;  // why transport_ is null
   std::unique_ptr<RtpTransport> transport_;
   IoPtr packets_;
   AVFormatContext* format_ = nullptr;
-  // What ended the last wait for a packet, if it was no packet.
+  // What ended the last wait for a packet; kOk: a packet.
   ReadStatus transport_status_ = ReadStatus::kOk;
   std::string transport_error_;
   double arrival_s_ = 0;       // of the last packet
-  double last_picture_s_ = 0;  // when the last that came whole did; or the connection's beginning
+  double last_picture_s_ = 0;  // arrival of the last whole picture, or start of the connection
   bool any_picture_ = false;
   BearableTimestamps timestamps_;
   PictureEnds ends_;
   std::shared_ptr<const AVCodecParameters> parameters_;
-  std::optional<CodedBy> coded_by_;  // empty: by itself, as JPEG is
+  std::optional<CodedBy> coded_by_;  // nullopt: independently coded pictures, as JPEG
   CodecContextPtr parser_context_;
   ParserPtr parser_;
-  int last_output_number_ = 0;  // of the picture before, in the order in which they are to be seen
+  int last_output_number_ = 0;  // of the previous picture, in display order
   AccessUnit growing_;          // H.264, H.265: the picture whose pieces are arriving
-  bool grown_ = false;          // and its last one came
+  bool grown_ = false;          // its last piece has come
   StreamFilter filter_;
   StampGuard stamps_;
   bool any_stamp_ = false;
   std::optional<std::uint32_t> stamped_by_;  // SSRC of the last good stamp
-  bool report_is_old_ = false;  // the sender's last one is of its clock before it jumped
+  bool report_is_old_ = false;  // the last RTCP report predates a jump of the sender's clock
   std::int64_t bad_stamps_ = 0;
   double bad_stamp_off_s_ = 0;
   std::int64_t damaged_ = 0;

@@ -7,16 +7,16 @@ namespace {
 
 constexpr std::size_t kFixedHeader = 12;                  // bytes
 constexpr std::size_t kWord = 4;                          // bytes
-constexpr std::size_t kTimestamp = 4;                     // where it stands in RTP's header
-constexpr std::size_t kReportTimestamp = 16;              // the same in a sender report
-constexpr std::uint8_t kSenderReport = 200;               // RTCP's type; others stand behind it
-constexpr std::uint32_t kSecond = 90'000;                 // ticks of video's clock
-constexpr std::uint32_t kUnknownTimestamp = 0xFFFF'FFFF;  // a timestamp, to libavformat
-constexpr std::uint32_t kOnvifReplay = 0xABAC;            // the extension's name
-constexpr std::size_t kReplayWords = 3;                   // time in two words, flags in one
-constexpr double kUnixInNtp = 2'208'988'800.0;            // s from 1900 to 1970
-constexpr double kNtpEra = 4'294'967'296.0;         // s that NTP's seconds count before they wrap
-constexpr std::uint32_t kSecondHalf = 0x8000'0000;  // of the era that began in 1900: since 1968
+constexpr std::size_t kTimestamp = 4;                     // offset in the RTP header
+constexpr std::size_t kReportTimestamp = 16;              // offset in a sender report
+constexpr std::uint8_t kSenderReport = 200;               // RTCP type; others follow it
+constexpr std::uint32_t kSecond = 90'000;                 // ticks of the video clock
+constexpr std::uint32_t kUnknownTimestamp = 0xFFFF'FFFF;  // means "unknown" to libavformat
+constexpr std::uint32_t kOnvifReplay = 0xABAC;            // profile of the extension
+constexpr std::size_t kReplayWords = 3;                   // two words of time, one of flags
+constexpr double kUnixInNtp = 2'208'988'800.0;            // s; from 1900 to 1970
+constexpr double kNtpEra = 4'294'967'296.0;               // s; period of the NTP seconds
+constexpr std::uint32_t kSecondHalf = 0x8000'0000;  // of the era that started in 1900: from 1968 on
 
 std::uint32_t big_endian(const std::uint8_t* bytes, std::size_t count) {
   std::uint32_t value = 0;
@@ -25,7 +25,7 @@ std::uint32_t big_endian(const std::uint8_t* bytes, std::size_t count) {
 }
 
 std::optional<double> unix_time(std::uint32_t ntp_seconds, std::uint32_t ntp_fraction) {
-  if (ntp_seconds == 0 && ntp_fraction == 0) return std::nullopt;  // the sender does not know
+  if (ntp_seconds == 0 && ntp_fraction == 0) return std::nullopt;  // unknown to the sender
   const double era_s = ntp_seconds < kSecondHalf ? kNtpEra : 0;
   return era_s + ntp_seconds - kUnixInNtp + ntp_fraction / kNtpEra;
 }
@@ -34,7 +34,7 @@ std::optional<double> unix_time(std::uint32_t ntp_seconds, std::uint32_t ntp_fra
 
 std::optional<RtpHeader> parse_rtp_header(const std::uint8_t* data, std::size_t size) {
   if (size < kFixedHeader || data[0] >> 6U != 2) return std::nullopt;
-  // The types of RTCP packets, which payload types avoid for this purpose (RFC 5761, 4).
+  // RTCP packet types, which payload types avoid for this purpose (RFC 5761, 4).
   if (data[1] >= 192 && data[1] <= 223) return std::nullopt;
   RtpHeader header;
   header.marker = (data[1] & 0x80U) != 0;
@@ -43,7 +43,7 @@ std::optional<RtpHeader> parse_rtp_header(const std::uint8_t* data, std::size_t 
   header.payload_type = data[1] & 0x7FU;
   header.source = big_endian(data + 8, 4);
   const bool has_extension = (data[0] & 0x10U) != 0;
-  const std::size_t extension = kFixedHeader + kWord * (data[0] & 0x0FU);  // behind the CSRCs
+  const std::size_t extension = kFixedHeader + kWord * (data[0] & 0x0FU);  // after the CSRCs
   if (!has_extension || size < extension + kWord) return header;
   const std::size_t words = big_endian(data + extension + 2, 2);
   if (big_endian(data + extension, 2) == kOnvifReplay && words >= kReplayWords &&

@@ -21,9 +21,9 @@ namespace alidade {
 namespace {
 
 constexpr std::size_t kDecoderCapacity = 16;  // pictures: the most that H.264 may hold back
-constexpr double kWorthSaying_s = 3;          // most cameras send a key frame more often
+constexpr double kWorthSaying_s = 3;          // most cameras send key frames more often
 
-// The decoder counts the blocks at a picture's edges as a whole.
+// The decoder counts whole blocks at a picture's edges.
 std::int64_t with_whole_blocks(std::int64_t pixels) {
   constexpr std::int64_t kBlock = 64;  // px, H.265's largest
   return pixels + 2 * kBlock * (kMostPictureSide + kBlock);
@@ -37,7 +37,7 @@ class RtpSource : public FrameSource {
  public:
   explicit RtpSource(const RtpSourceOptions& options) : options_(options) {
     silence_av_log();
-    // The form "any interface" that libcurl takes for no URL.
+    // The form for "any interface", which libcurl does not accept as a URL.
     if (options_.url.rfind("rtp://@:", 0) == 0) {
       options_.url.replace(0, 8, "rtp://0.0.0.0:");
     }
@@ -60,7 +60,7 @@ class RtpSource : public FrameSource {
   std::string remark() override { return remarks_.take(); }
 
  private:
-  // What of a connection was added to the counters.
+  // How much of a connection's counts was added to the counters.
   struct Counted {
     std::int64_t damaged = 0;
     std::int64_t unstamped = 0;
@@ -84,7 +84,7 @@ class RtpSource : public FrameSource {
     failed_ = true;
     return ReadStatus::kFailed;
   }
-  // What a peer sends ends the program only before the first frame; then the connection.
+  // A peer's content ends the program only before the first frame; later it ends the connection.
   ReadStatus fail_or_refuse(const std::string& error) {
     if (next_frame_ == 0) return fail(error);
     thread_.refuse(error);
@@ -104,43 +104,44 @@ class RtpSource : public FrameSource {
   std::atomic<std::int64_t> garbage_bytes_{0};
   Remarks remarks_;
 
-  // Since when pictures come that a key frame must precede, by CLOCK_MONOTONIC; < 0: they need not wait. At a connection's
-  // beginning (and where a slow reader left pictures), and after a loss.
+  // Since when pictures have come that need a key frame before them (CLOCK_MONOTONIC); < 0: none is
+  // awaited. First: at the start of a connection, or after pictures were dropped for a slow
+  // reader. Second: after a loss.
   std::atomic<double> no_first_key_since_s_{-1};
   std::atomic<double> no_key_after_loss_since_s_{-1};
 
   std::mutex mutex_;
   RtpConnection* connection_ = nullptr;  // guarded by mutex_
 
-  // The receiving thread's own.
+  // Used by the receiving thread only.
   bool wait_for_key_ = true;
-  bool worked_ = false;  // a connection before this one has brought pictures
+  bool worked_ = false;  // an earlier connection has brought pictures
   Counted counted_;      // of this connection
 
-  // read()'s own.
+  // Used by read() only.
   std::string error_;
   bool failed_ = false;
   bool restarted_ = true;
   std::int64_t next_frame_ = 0;
   std::shared_ptr<const AVCodecParameters> parameters_;
   LumaDecoder decoder_;
-  bool spoilt_ = false;  // what later pictures are coded from is lost or damaged
+  bool spoilt_ = false;  // a picture that later ones depend on is lost or damaged
   std::deque<AccessUnit> in_decoder_;
   bool size_known_ = false;  // of this connection's pictures
   int width_ = 0;
   int height_ = 0;
   StreamCopy copy_;
 
-  // Last: its thread uses the others.
+  // Last, as its thread uses the other members.
   ReceivingThread<Arrived> thread_{options_.max_backoff_s,
                                    [this](std::string* error) { return receive_connection(error); },
                                    [this] { interrupt(); }};
 };
 
-// What the options cannot mean, before any connection; leaves the URL without credentials.
+// Checks the options before any connection; removes credentials from the URL.
 void RtpSource::check() {
   if (options_.url.find("://") == std::string::npos) {
-    return;  // an SDP file: libavformat says whether it can be used
+    return;  // an SDP file: libavformat reports if it is unusable
   }
   Url url;
   std::string error;
@@ -170,7 +171,7 @@ void RtpSource::check() {
   }
 }
 
-// Where pictures are dropped, all are: those that follow cannot be decoded up to the next key frame.
+// If pictures are dropped, all are: none can be decoded until the next key frame.
 void RtpSource::push(Arrived arrived) {
   if (thread_.full(static_cast<std::size_t>(arrived.unit.packet->size))) {
     thread_.drop_all();
@@ -180,7 +181,7 @@ void RtpSource::push(Arrived arrived) {
     begin_waiting(&no_first_key_since_s_);
     return;
   }
-  // The decoder has had nothing that leads up to it.
+  // The decoder did not get the pictures before it.
   if (std::exchange(wait_for_key_, false)) arrived.unit.follows = false;
   no_first_key_since_s_ = -1;
   const auto bytes = static_cast<std::size_t>(arrived.unit.packet->size);
@@ -202,7 +203,7 @@ std::string RtpSource::waiting() const {
   return options_.url + ": " + text;
 }
 
-// One connection from its beginning to its end.
+// One connection from start to end.
 ReadStatus RtpSource::receive_connection(std::string* error) {
   RtpConnection connection(options_);
   {
@@ -224,7 +225,8 @@ ReadStatus RtpSource::receive_connection(std::string* error) {
     }
   }
   no_first_key_since_s_ = -1;
-  // A camera that boots may refuse for a while what it is good for; and what a peer sends ends no program that it has served.
+  // A booting camera may refuse for a while. A peer's content does not end a program that it has
+  // served.
   worked_ = worked_ || works;
   if (status == ReadStatus::kFailed && worked_) status = ReadStatus::kDisconnected;
   const std::lock_guard<std::mutex> lock(mutex_);
@@ -291,7 +293,7 @@ ReadStatus RtpSource::read(Frame& frame, double timeout_s) {
   }
 }
 
-// Turns a picture's data into the frame; kTimeout if that cannot be done with this one.
+// Makes a frame from a picture's data; kTimeout if this picture gives none.
 ReadStatus RtpSource::deliver(Arrived arrived, Frame& frame) {
   AccessUnit unit = std::move(arrived.unit);
   restarted_ = restarted_ || unit.begins_anew;
@@ -344,7 +346,7 @@ ReadStatus RtpSource::deliver(Arrived arrived, Frame& frame) {
   return ReadStatus::kOk;
 }
 
-// A frame without luma.
+// Fills a frame without luma.
 void RtpSource::give(const AccessUnit& unit, int width, int height, Frame& frame) {
   frame = Frame{};
   frame.stamp.frame = next_frame_++;
@@ -356,8 +358,9 @@ void RtpSource::give(const AccessUnit& unit, int width, int height, Frame& frame
   frame.height = height;
 }
 
-// Whether the picture came whole, and all that it is coded from. After a loss that is so from the next one on at which
-// decoding can begin; in a copy, whose readers know nothing of the loss, at once.
+// True if the picture and all that it depends on are complete. After a loss that holds again from
+// the next picture at which decoding can start; in a copy, whose readers do not know of the loss,
+// from the next at which it starts at once.
 bool RtpSource::can_be_decoded(const AccessUnit& unit) {
   if (!unit.whole) ++damaged_;
   if (!unit.whole || !unit.follows) spoil();
@@ -372,14 +375,14 @@ bool RtpSource::can_be_decoded(const AccessUnit& unit) {
   return true;
 }
 
-// What comes cannot be decoded for want of what came before.
+// Later pictures cannot be decoded, as one that they depend on is missing.
 void RtpSource::spoil() {
   spoilt_ = true;
   begin_waiting(&no_key_after_loss_since_s_);
 }
 
-// A decoder may hold a picture back: *unit becomes the one that belongs to the picture that came out.
-// kTimeout if none came; *unit is the same then if decoding has only begun.
+// A decoder may hold a picture back: *unit becomes the one that belongs to the returned picture.
+// kTimeout if none came out; *unit is unchanged then if decoding has only started.
 ReadStatus RtpSource::decode(AccessUnit* unit, Picture* picture) {
   const bool others_need_it = coded_by(parameters_->codec_id).has_value();
   bool damaged = !decoder_.send(unit->packet.get());
@@ -407,7 +410,7 @@ ReadStatus RtpSource::decode(AccessUnit* unit, Picture* picture) {
     in_decoder_.clear();
     return ReadStatus::kTimeout;
   }
-  // What lies before the picture's own packet gave no picture.
+  // Units before the one of this picture gave no picture.
   while (!in_decoder_.empty() && (came ? in_decoder_.front().packet->pts != picture->pts
                                        : in_decoder_.size() > kDecoderCapacity)) {
     in_decoder_.pop_front();

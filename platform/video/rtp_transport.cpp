@@ -23,7 +23,7 @@ namespace alidade {
 namespace {
 
 constexpr int kSocketBuffer = 4 << 20;  // bytes: several pictures
-constexpr double kSlice_s = 0.1;        // of a wait: how late an interruption is noticed at most
+constexpr double kSlice_s = 0.1;        // of a wait: longest delay of an interruption
 
 // A numeric address as the socket interface takes it, IPv4 or IPv6.
 struct SocketAddress {
@@ -33,13 +33,13 @@ struct SocketAddress {
   [[nodiscard]] const sockaddr* get() const { return reinterpret_cast<const sockaddr*>(&storage); }
 };
 
-// What a pair of ports listens to.
+// The address of a pair of ports.
 struct Listening {
   SocketAddress address;  // with port 0
   bool is_group = false;  // multicast
 };
 
-// What is no number is taken for IPv4, any.
+// Text that is not a numeric address gives IPv4, any.
 SocketAddress numeric(const std::string& address) {
   SocketAddress out;
   sockaddr_in ipv4{};
@@ -64,7 +64,7 @@ bool is_multicast(const SocketAddress& address) {
       ntohl(reinterpret_cast<const sockaddr_in*>(&address.storage)->sin_addr.s_addr));
 }
 
-// A sender's address only tells whether it is IPv4 or IPv6.
+// A sender's address only selects IPv4 or IPv6.
 Listening listening_to(const std::string& address) {
   const SocketAddress told = numeric(address);
   if (is_multicast(told)) return {told, true};
@@ -86,7 +86,8 @@ bool set(const FileDescriptor& socket, int level, int name, const Value& value) 
   return ::setsockopt(socket.get(), level, name, &value, sizeof value) == 0;
 }
 
-// Where the senders are known the network is told, too (RFC 4607): some bring a group's packets only then.
+// If the senders are known, joins for them only (RFC 4607): some networks forward a group's packets
+// only then.
 bool join(const FileDescriptor& socket, const SocketAddress& group, const UdpSenders& senders) {
   const int level = group.storage.ss_family == AF_INET6 ? IPPROTO_IPV6 : IPPROTO_IP;
   for (const std::string& sender : senders.names()) {
@@ -101,15 +102,16 @@ bool join(const FileDescriptor& socket, const SocketAddress& group, const UdpSen
   return set(socket, level, MCAST_JOIN_GROUP, request);
 }
 
-// None: errno says why.
+// A closed one on failure; errno says why.
 FileDescriptor open_socket(const Listening& to, int port, const UdpSenders& senders) {
   const int family = to.address.storage.ss_family;
   FileDescriptor socket(::socket(family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   if (!socket.is_open()) return socket;
-  // Less than that, and packets without their time, will do.
+  // A smaller buffer, and packets without a kernel time, will do.
   (void)set(socket, SOL_SOCKET, SO_RCVBUF, kSocketBuffer);
   (void)set(socket, SOL_SOCKET, SO_TIMESTAMPNS, 1);
-  // A group has many listeners, and each is to hear no other group that comes to the same port.
+  // A group may have several listeners on a host. A socket must not receive other groups on the
+  // same port.
   const SocketAddress bound = with_port(to.address, port);
   const bool works = (!to.is_group || set(socket, SOL_SOCKET, SO_REUSEADDR, 1)) &&
                      (family != AF_INET6 || set(socket, IPPROTO_IPV6, IPV6_V6ONLY, 1)) &&
@@ -123,7 +125,8 @@ double seconds(const timespec& time) {
   return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
-// The kernel stamps by the host's UTC, which may have been set since. What passes between the clocks makes a packet late, not early.
+// The kernel's stamp is in UTC, which may have been set since. The time between reading the two
+// clocks makes a packet seem late, never early.
 double age_of(msghdr* message) {
   for (cmsghdr* item = CMSG_FIRSTHDR(message); item != nullptr; item = CMSG_NXTHDR(message, item)) {
     if (item->cmsg_level != SOL_SOCKET || item->cmsg_type != SCM_TIMESTAMPNS) continue;
@@ -151,7 +154,7 @@ ReadStatus RtpPorts::open(const std::string& address, int port, const UdpSenders
   return ReadStatus::kOk;
 }
 
-// The next packet that waits; kTimeout: none does, or it is somebody else's.
+// The next waiting packet. kTimeout: there is none, or it is from another sender.
 ReadStatus RtpPorts::take(Socket* socket, std::uint8_t* data, std::size_t capacity,
                           ReceivedPacket* packet, std::string* error) {
   iovec place{data, capacity};

@@ -1,9 +1,8 @@
 #pragma once
-// Where RTP packets come from: UDP ports, by themselves here, or with an RTSP session
-// (rtsp_session.h). Part of RtpConnection, which takes the packets apart.
-//
-// open() and receive() block until deadline_s (CLOCK_MONOTONIC) at most; after interrupt(), which any
-// thread may call, they return within 0.1 s, for good.
+// Sources of RTP packets: UDP ports (here), alone or with an RTSP session (rtsp_session.h). Part of
+// RtpConnection, which unpacks the packets. open() and receive() block until deadline_s
+// (CLOCK_MONOTONIC) at most. After interrupt(), which any thread may call, they and all later calls
+// return within 0.1 s.
 
 #include <array>
 #include <atomic>
@@ -19,60 +18,60 @@
 
 namespace alidade {
 
-// An RTP or RTCP packet that came.
+// A received RTP or RTCP packet.
 struct ReceivedPacket {
   std::size_t size = 0;  // bytes
-  double arrival_s =
-      0;  // CLOCK_MONOTONIC: as the kernel has it where it says, else when it was read
+  // CLOCK_MONOTONIC; the kernel's time if it gives one, else when the packet was read.
+  double arrival_s = 0;
 };
 
 class RtpTransport {
  public:
   virtual ~RtpTransport() = default;
 
-  // kOk: *sdp describes what will come. Else *error is one line without URL and password.
+  // kOk: *sdp describes the stream. Otherwise *error is one line without URL and password.
   [[nodiscard]] virtual ReadStatus open(double deadline_s, std::string* sdp,
                                         std::string* error) = 0;
 
-  // The next packet, RTP or RTCP. kTimeout: none until the deadline. Else as open().
+  // The next RTP or RTCP packet. kTimeout: none until the deadline. Other results as of open().
   [[nodiscard]] virtual ReadStatus receive(double deadline_s, std::uint8_t* data,
                                            std::size_t capacity, ReceivedPacket* packet,
                                            std::string* error) = 0;
 
   virtual void interrupt() = 0;
 
-  // Of the open transport: the SSRC of the packets that will come, if the sender told it.
+  // Of the open transport: SSRC of the packets to come, if the sender announced it.
   [[nodiscard]] virtual std::optional<std::uint32_t> agreed_source() const { return std::nullopt; }
-  // Packets of somebody else than the sender, left out, and whose in a person's words.
+  // Packets from others than the sender, which are left out, and a description of those others.
   [[nodiscard]] virtual std::int64_t foreign() const { return 0; }
   [[nodiscard]] virtual std::string foreign_kind() const { return ""; }
-  // Bytes passed over because they belong to no packet.
+  // Skipped bytes that belong to no packet.
   [[nodiscard]] virtual std::int64_t garbage() const { return 0; }
 };
 
-// A pair of UDP ports, for RTP and RTCP.
-//
-// Packets have the time at which the kernel took them from the network: what happens until this process reads them (others
-// compute, it was stopped) is no part of it. So the packets amid a picture can be left to gather for kGather_s before they
-// are waited for: a wake-up for each costs a third of what a picture costs from packet to record.
+// A pair of UDP ports, for RTP and RTCP. Packets have the time at which the kernel received them,
+// so delays until this process reads them (load, a stopped process) do not matter. Therefore
+// packets within a picture may gather for kGather_s before the next wait: waking up for each would
+// cost a third of the time of a picture from packet to record.
 class RtpPorts {
  public:
   static constexpr double kGather_s = 150e-6;
 
-  // address: the group to join, or of the sender. senders: whose packets are taken, on both ports.
+  // address: the multicast group, or the sender's address. senders: whose packets are accepted, on
+  // both ports.
   [[nodiscard]] ReadStatus open(const std::string& address, int port, const UdpSenders& senders,
                                 std::string* error);
   [[nodiscard]] ReadStatus receive(double deadline_s, std::uint8_t* data, std::size_t capacity,
                                    ReceivedPacket* packet, std::string* error);
   void interrupt() { interrupted_ = true; }  // thread-safe
-  // One more sender, whom the first has named. What is no numeric address is left out.
+  // Accepts one more sender, named by the first. Ignored if it is not a numeric address.
   void also_from(const std::string& address) { (void)senders_.add(address); }
   [[nodiscard]] const UdpSenders& senders() const { return senders_; }
 
  private:
   struct Socket {
     FileDescriptor descriptor;
-    double not_before_s = 0;  // what waits has come since
+    double not_before_s = 0;  // a packet that is waiting came after this time
   };
   ReadStatus take(Socket* socket, std::uint8_t* data, std::size_t capacity, ReceivedPacket* packet,
                   std::string* error);
@@ -80,10 +79,10 @@ class RtpPorts {
   std::atomic<bool> interrupted_{false};
   UdpSenders senders_;
   std::array<Socket, 2> sockets_;  // RTP, RTCP
-  bool amid_picture_ = false;      // after the last RTP packet
+  bool amid_picture_ = false;      // the last RTP packet was not the end of a picture
 };
 
-// What a session description or an rtp:// URL says.
+// Plain RTP, from a session description or an rtp:// URL.
 class UdpTransport : public RtpTransport {
  public:
   explicit UdpTransport(std::string sdp) : sdp_(std::move(sdp)) {}

@@ -12,10 +12,10 @@ namespace {
 constexpr std::size_t kPacketHead = 4;  // bytes
 constexpr std::size_t kLargestPacket = 65'535;
 constexpr std::size_t kLeastPacket = 8;     // RTCP's shortest
-constexpr unsigned kMostChannels = 32;      // of those that nobody asked for
-constexpr std::size_t kMaxHead = 16 << 10;  // bytes of a message's line and headers
+constexpr unsigned kMostChannels = 32;      // channels that were not agreed on
+constexpr std::size_t kMaxHead = 16 << 10;  // bytes of a message's first line and headers
 
-// What a camera may begin a message with.
+// Possible starts of a camera's message.
 constexpr std::array<std::string_view, 12> kBeginnings = {
     "RTSP/1.", "OPTIONS ",  "ANNOUNCE ", "GET_PARAMETER ", "SET_PARAMETER ", "REDIRECT ",
     "PLAY ",   "DESCRIBE ", "SETUP ",    "PAUSE ",         "TEARDOWN ",      "RECORD "};
@@ -26,7 +26,7 @@ unsigned byte_at(std::string_view bytes, std::size_t at) {
 
 bool is_line_end(char c) { return c == '\r' || c == '\n'; }
 
-// Of the body, at most one byte more than a message may have; none: not a number.
+// Size of the body, at most one byte more than a message may have; nullopt: not a number.
 std::optional<std::size_t> body_size(std::string_view head) {
   constexpr std::string_view kName = "content-length:";
   const auto same = [](char a, char b) {
@@ -85,7 +85,7 @@ RtspFraming::Extent RtspFraming::message_at(std::string_view bytes) const {
     return bytes.substr(0, common) == beginning.substr(0, common);
   });
   if (!begins) return {Guess::kNot};
-  std::size_t line = 0;  // where this one begins
+  std::size_t line = 0;  // start of the current line
   for (std::size_t at = 0; at < std::min(bytes.size(), kMaxHead); ++at) {
     if (bytes[at] == '\n') {
       const bool empty = at == line || (at == line + 1 && bytes[line] == '\r');

@@ -19,8 +19,8 @@ namespace {
 
 constexpr int kRtspPort = 554;
 constexpr int kRtspsPort = 322;
-constexpr double kPollSlice_s = 0.1;  // of a wait: how late an interruption is noticed at most
-constexpr double kLongest_s = 1e9;    // what the libraries' integers hold
+constexpr double kPollSlice_s = 0.1;  // of a wait: longest delay of an interruption
+constexpr double kLongest_s = 1e9;    // fits into the libraries' integers
 constexpr std::size_t kMaxEarlyBytes = 4 << 20;
 constexpr const char* kClosed = "the camera closed the connection";
 constexpr const char* kNotRtsp = "what the camera sends is not RTSP";
@@ -32,7 +32,7 @@ bool is_ready(int descriptor, short events, double wait_s) {
 
 }  // namespace
 
-// The socket is shut down for reading only: a farewell can still go out.
+// Shuts down only reading: a farewell can still be sent.
 void RtspLink::interrupt() {
   interrupted_ = true;
   const std::lock_guard<std::mutex> lock(mutex_);
@@ -40,7 +40,7 @@ void RtspLink::interrupt() {
   if (descriptor_ >= 0) ::shutdown(descriptor_, SHUT_RD);
 }
 
-// Shut down first: TLS would wait until its own farewell has room.
+// The shutdown comes first: TLS would wait until its own farewell is sent.
 void RtspLink::close() {
   const std::lock_guard<std::mutex> lock(mutex_);
   if (descriptor_ >= 0) ::shutdown(descriptor_, SHUT_RDWR);
@@ -55,7 +55,7 @@ ReadStatus RtspLink::lost(const std::string& why, std::string* error) const {
   return ReadStatus::kDisconnected;
 }
 
-// GLib's own time-outs begin anew with each address and each byte.
+// GLib's own timeouts restart with each address and each byte.
 ReadStatus RtspLink::connect(const std::string& address, double deadline_s, std::string* error) {
   GstRTSPUrl* parsed = nullptr;
   if (gst_rtsp_url_parse(address.c_str(), &parsed) != GST_RTSP_OK) {
@@ -189,7 +189,7 @@ bool RtspLink::early_packet(Packet* packet) {
   return true;
 }
 
-// Once packets may come, some garbage among them is passed over.
+// Once packets may come, some garbage is tolerated.
 bool RtspLink::is_rtsp(std::string* error) const {
   if (!framing_.is_lost() && (packets_ || framing_.garbage() == 0)) return true;
   *error = !packets_ && framing_.had_long_message()
@@ -199,7 +199,7 @@ bool RtspLink::is_rtsp(std::string* error) const {
   return false;
 }
 
-// Reads what is there, after at most wait_s. kTimeout: nothing.
+// Reads the available bytes, after at most wait_s. kTimeout: none.
 ReadStatus RtspLink::fill(double wait_s, std::string* error) {
   if (!is_rtsp(error)) return ReadStatus::kDisconnected;
   wait_s = std::clamp(wait_s, 0.0, kPollSlice_s);

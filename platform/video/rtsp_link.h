@@ -1,9 +1,10 @@
 #pragma once
-// RtspLink: the connection to an RTSP camera, with or without TLS (rtsp_tls.h): messages go out, messages and packets come
-// in. It knows nothing of what they mean. Part of RtspSession.
-// By GLib's sockets, and not GStreamer's RTSP connection: that waits for a message's end without end, takes any length that
-// it is told, and ends at the first byte that is wrong. Here every call has one deadline, whatever comes meanwhile, and ends
-// with interrupt(); what comes is read as far as it is there and taken apart by rtsp_framing.h, which bounds the memory.
+// RtspLink: the connection to an RTSP camera, with or without TLS (rtsp_tls.h): sends messages,
+// receives messages and packets, without interpreting them. Part of RtspSession. Uses GLib's
+// sockets instead of GStreamer's RTSP connection, which waits without limit for the end of a
+// message, accepts any length, and ends at the first wrong byte. Here every call has one deadline,
+// whatever the camera sends, and ends with interrupt(). Available bytes are split by
+// rtsp_framing.h, which bounds the memory.
 
 #include <gio/gio.h>
 
@@ -33,24 +34,25 @@ class RtspLink {
   RtspLink(const RtspLink&) = delete;
   RtspLink& operator=(const RtspLink&) = delete;
 
-  // Name, connection and TLS's greeting within the deadline.
+  // Name look-up, connection and TLS handshake within the deadline.
   [[nodiscard]] ReadStatus connect(const std::string& address, double deadline_s,
                                    std::string* error);
-  // The numeric address of the camera, or of what stands for it; empty: unknown.
+  // Numeric address of the camera or of the proxy in front of it; empty: unknown.
   [[nodiscard]] std::string peer() const;
 
   [[nodiscard]] ReadStatus send(const std::string& text, double deadline_s, std::string* error);
-  // As far as there is room for it at once; after interrupt(), too.
+  // Sends what fits at once, also after interrupt().
   void send_farewell(const std::string& text);
-  // Packets that come before it are kept: early_packet().
+  // Packets that come before the message are kept: early_packet().
   [[nodiscard]] ReadStatus next_message(double deadline_s, RtspMessage* message,
                                         std::string* error);
 
-  // Called before PLAY is asked for: what comes behind may be packets. first: the channel for RTP; the next is RTCP's.
+  // Call it before PLAY is requested: packets may follow. first: the RTP channel; RTCP has the next
+  // one.
   void expect_packets(int first_channel);
-  // A message, or a packet of the video. kTimeout: none so far.
+  // A message or a packet of the video. kTimeout: none so far.
   [[nodiscard]] ReadStatus next(double wait_s, RtspFraming::Item* item, std::string* error);
-  // Of those before PLAY's answer, the first. False: no more.
+  // The first of the packets that came before PLAY's answer. False: no more.
   [[nodiscard]] bool early_packet(Packet* packet);
   [[nodiscard]] std::int64_t garbage() const { return framing_.garbage(); }
 
@@ -72,15 +74,15 @@ class RtspLink {
 
   RtspTls tls_;
   std::atomic<bool> interrupted_{false};
-  std::mutex mutex_;  // lets interrupt() see whole what of these is there
+  std::mutex mutex_;  // so that interrupt() sees the following in a consistent state
   std::unique_ptr<GCancellable, GObjectUnref> connecting_;
   std::unique_ptr<GSocketConnection, GObjectUnref> connection_;
-  int descriptor_ = -1;                    // of its socket
-  GPollableInputStream* input_ = nullptr;  // its bytes, out of TLS
+  int descriptor_ = -1;                    // of the socket
+  GPollableInputStream* input_ = nullptr;  // decrypted input, with TLS
   GPollableOutputStream* output_ = nullptr;
-  bool packets_ = false;  // may come
+  bool packets_ = false;  // packets may come
   int first_channel_ = 0;
-  std::deque<Packet> early_;  // came before the answer to PLAY
+  std::deque<Packet> early_;  // packets before the answer to PLAY
   std::size_t early_bytes_ = 0;
   RtspFraming framing_;
 };

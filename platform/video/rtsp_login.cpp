@@ -10,7 +10,7 @@ struct FreeGText {
 };
 using GText = std::unique_ptr<gchar, FreeGText>;
 
-// Between quotation marks (RFC 7230, 3.2.6).
+// As a quoted string (RFC 7230, 3.2.6).
 std::string quoted(const std::string& text) {
   std::string out = "\"";
   for (const char each : text) {
@@ -47,7 +47,7 @@ std::string RtspLogin::header(GstRTSPMethod method, const std::string& url) cons
       nullptr, gst_rtsp_method_as_text(method), realm_.c_str(), user_.c_str(), password_.c_str(),
       url.c_str(), nonce_.c_str()));
   if (!response) return "";
-  // What the camera gave goes back as it came.
+  // The camera's values are returned unchanged.
   std::string all = "Digest username=" + quoted(user_) + ", realm=\"" + realm_ + "\", nonce=\"" +
                     nonce_ + "\", uri=\"" + url + "\", response=\"" + response.get() + "\"";
   if (has_opaque_) all += ", opaque=\"" + opaque_ + "\"";

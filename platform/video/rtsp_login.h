@@ -1,6 +1,6 @@
 #pragma once
-// RtspLogin: the header by which a request logs in, once a camera has asked for it: digest (RFC 2069, MD5, as cameras have it)
-// or basic. Part of RtspSession. No I/O.
+// RtspLogin: the Authorization header for a camera that has asked for a login: digest (RFC 2069
+// with MD5, as cameras use it) or basic. Part of RtspSession. No I/O.
 
 #include <gst/rtsp/gstrtspdefs.h>
 #include <gst/rtsp/gstrtspmessage.h>
@@ -11,12 +11,12 @@ namespace alidade {
 
 class RtspLogin {
  public:
-  RtspLogin() = default;  // none
-  // challenge: basic or digest, as a camera's answer 401 has it.
+  RtspLogin() = default;  // no login
+  // challenge: basic or digest, from a camera's 401 answer.
   RtspLogin(const GstRTSPAuthCredential& challenge, const std::string& user,
             const std::string& password);
 
-  // The value of Authorization; empty: none.
+  // Value of the Authorization header; empty: none.
   [[nodiscard]] std::string header(GstRTSPMethod method, const std::string& url) const;
 
  private:

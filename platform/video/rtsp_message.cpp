@@ -12,7 +12,7 @@ std::string_view without_blanks(std::string_view text) {
   return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
 }
 
-// The next of `what` up to the separator, which goes, too.
+// Takes the text up to the separator, and removes both from *what.
 std::string take(std::string_view* what, char separator) {
   const std::size_t end = std::min(what->find(separator), what->size());
   std::string taken(without_blanks(what->substr(0, end)));
@@ -48,7 +48,7 @@ bool RtspMessage::parse(std::string_view text) {
     if (line.find(':') == std::string_view::npos) continue;
     const std::string name = take(&line, ':');
     std::string value(without_blanks(line));
-    // Goes on in the lines behind it that begin with a blank.
+    // A header continues in the following lines that start with a blank.
     while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) {
       const std::string_view more = without_blanks(take_line(&text));
       if (!more.empty()) value.append(" ").append(more);

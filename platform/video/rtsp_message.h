@@ -1,5 +1,6 @@
 #pragma once
-// RtspMessage: owns a message of GStreamer's RTSP library, and reads out of it what RtspSession needs.
+// RtspMessage: owns a message of GStreamer's RTSP library and reads the parts that RtspSession
+// needs.
 
 #include <gst/rtsp/gstrtspmessage.h>
 
@@ -19,14 +20,14 @@ class RtspMessage {
   RtspMessage& operator=(const RtspMessage&) = delete;
 
   GstRTSPMessage* get() { return &message_; }
-  // For a function that fills it anew.
+  // Cleared, for a function that fills it.
   GstRTSPMessage* cleared() {
     gst_rtsp_message_unset(&message_);
     return &message_;
   }
-  // As RtspFraming gives it. False: neither a request nor a response.
+  // Parses a message from RtspFraming. False: neither a request nor a response.
   [[nodiscard]] bool parse(std::string_view text);
-  // As it is sent; of one that we make, and so without a body.
+  // The message as sent; only for our own messages, which have no body.
   [[nodiscard]] std::string text();
   GstRTSPMsgType type() { return gst_rtsp_message_get_type(&message_); }
   int status() const { return message_.type_data.response.code; }
@@ -36,7 +37,7 @@ class RtspMessage {
     gst_rtsp_message_get_header(&message_, field, &value, 0);
     return value == nullptr ? "" : value;
   }
-  // In one header, or in several.
+  // True if a header of this name contains the item; there may be several.
   bool lists(GstRTSPHeaderField field, const char* item) {
     gchar* value = nullptr;
     for (int i = 0; gst_rtsp_message_get_header(&message_, field, &value, i) == GST_RTSP_OK; ++i) {

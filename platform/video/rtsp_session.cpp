@@ -18,21 +18,21 @@ namespace alidade {
 namespace {
 
 constexpr int kPortTries = 100;
-constexpr double kReply_s = 0.5;     // given to an answer to the camera's own question
-constexpr double kUdpSlice_s = 0.1;  // by UDP: of a wait
+constexpr double kReply_s = 0.5;     // for the answer to a request of the camera
+constexpr double kUdpSlice_s = 0.1;  // of a wait, with UDP
 constexpr const char* kTimeout = "timeout=";
 constexpr double kUsualTimeout_s = 60;  // of a session (RFC 2326, 12.37)
 constexpr double kPingEarlier_s = 5;
 constexpr double kLeastPing_s = 0.5;
 
-// A control attribute (RFC 2326, C.1.1) against the address that it is relative to.
+// Resolves a control attribute (RFC 2326, C.1.1) against its base.
 std::string resolve(const std::string& base, const std::string& control) {
   if (control.empty() || control == "*") return base;
   if (control.find("://") != std::string::npos) return control;
   return base + (base.empty() || base.back() != '/' ? "/" : "") + control;
 }
 
-// The SSRC that RTP-Info tells (RFC 7826, 18.45), if it does.
+// The SSRC in RTP-Info (RFC 7826, 18.45), if given.
 std::optional<std::uint32_t> source_in(const std::string& rtp_info) {
   constexpr const char* kName = "ssrc=";
   const std::size_t at = rtp_info.find(kName);
@@ -84,7 +84,7 @@ ReadStatus RtspSession::open(double deadline_s, std::string* sdp, std::string* e
   return ReadStatus::kDisconnected;
 }
 
-// What a peer tells ends no program: it may tell another tomorrow.
+// A redirection never fails for good: the peer may give another one later.
 ReadStatus RtspSession::redirect(const std::string& location, std::string* error) {
   const Redirection next = judge_redirection(configured_, url_, location, options_.rules.redirects);
   if (next.url.empty()) {
@@ -176,7 +176,8 @@ ReadStatus RtspSession::play(const std::string& sdp, std::string* error) {
   return status;
 }
 
-// Its name and, where it is told, after how long without a request the camera ends it (RFC 2326, 12.37).
+// Session name and, if given, the time without a request after which the camera ends it (RFC 2326,
+// 12.37).
 void RtspSession::begin_session(const std::string& header) {
   const std::size_t end = std::min(header.find(';'), header.size());
   session_ = header.substr(0, header.find_last_not_of(' ', end == 0 ? 0 : end - 1) + 1);
@@ -190,7 +191,8 @@ void RtspSession::begin_session(const std::string& header) {
 
 bool RtspSession::open_ports() {
   std::minstd_rand random(std::random_device{}());
-  // Above those that programs choose for themselves, an rtp:// URL's among them: who comes first would take them away.
+  // Above the ports that programs usually choose, such as an rtp:// URL's: whoever came first would
+  // block them.
   std::uniform_int_distribution<int> any(17'000, 30'000);
   const std::string peer = link_.peer();
   UdpSenders camera;
@@ -228,7 +230,7 @@ ReadStatus RtspSession::send(const Request& request, double deadline_s, std::str
   return link_.send(message.text(), deadline_s, error);
 }
 
-// Sends the request, logs in if that is wanted, and waits for the answer.
+// Sends the request, logs in if asked to, and waits for the answer.
 ReadStatus RtspSession::ask(const Request& request, RtspMessage* answer, std::string* error) {
   for (bool logged_in = false;;) {
     ReadStatus status = send(request, deadline_s_, error);
@@ -244,7 +246,7 @@ ReadStatus RtspSession::ask(const Request& request, RtspMessage* answer, std::st
   }
 }
 
-// answer: 401. refused: with a login.
+// answer: a 401. refused: after a login.
 ReadStatus RtspSession::log_in(RtspMessage* answer, bool refused, std::string* error) {
   if (!logs_in_) {
     *error = login_wanted_elsewhere(url_);
@@ -256,7 +258,7 @@ ReadStatus RtspSession::log_in(RtspMessage* answer, bool refused, std::string* e
   return error->empty() ? ReadStatus::kOk : ReadStatus::kFailed;
 }
 
-// From here on each request has the login.
+// From here on each request carries the login.
 std::string RtspSession::accept_challenge(RtspMessage* answer) {
   const bool basic = options_.rules.permits_basic(url_.rfind("rtsps://", 0) == 0);
   bool offers_basic = false;
@@ -282,7 +284,7 @@ std::string RtspSession::accept_challenge(RtspMessage* answer) {
              : "the camera offers neither digest (MD5) nor basic authentication (401)";
 }
 
-// Cameras ask whether we are still there.
+// Cameras may ask if the client is still there.
 void RtspSession::reply(RtspMessage* request) {
   RtspMessage answer;
   gst_rtsp_message_init_response(answer.cleared(), GST_RTSP_STS_OK, "OK", request->get());
@@ -308,13 +310,14 @@ ReadStatus RtspSession::take_message(std::string_view text, std::string* error) 
     reply(&message);
   } else if (message.status() == GST_RTSP_STS_UNAUTHORIZED && logs_in_ &&
              accept_challenge(&message).empty() && !std::exchange(pinged_again_, true)) {
-    // To a ping. Digest's number used once may have run out: the session would, too, before the next.
+    // Answer to a ping. The digest nonce may have expired; without a new login the session would
+    // end before the next ping.
     return ping(error);
   }
   return ReadStatus::kOk;
 }
 
-// A message is taken alone: who floods with them holds nobody beyond a deadline.
+// Handles at most one message, so that a flood of them delays nobody beyond a deadline.
 ReadStatus RtspSession::next_packet(double wait_s, RtspFraming::Item* packet, std::string* error) {
   ReadStatus status = link_.next(wait_s, packet, error);
   if (status != ReadStatus::kOk || packet->kind == RtspFraming::Item::Kind::kPacket) {
@@ -333,10 +336,10 @@ ReadStatus RtspSession::receive(double deadline_s, std::uint8_t* data, std::size
     const double left_s = deadline_s - monotonic_now_s();
     RtspFraming::Item within;
     if (ports_) {
-      // Video leaves no silence in which to read what the camera says.
+      // Video comes without pauses in which to read the camera's messages.
       if (monotonic_now_s() >= next_look_s_) {
         next_look_s_ = monotonic_now_s() + kUdpSlice_s;
-        // One that closes this connection and sends on may do so: below, silence is the end.
+        // A camera may close this connection and go on sending: only silence, below, is the end.
         (void)next_packet(0, &within, error);
       }
       const double slice_end_s = monotonic_now_s() + std::min(left_s, kUdpSlice_s);

@@ -1,7 +1,7 @@
 #pragma once
-// RtspSession: the video of an RTSP camera (RFC 2326), its packets within the RTSP connection (rtsp_link.h) or by UDP;
-// over TLS (rtsps://) only within. Logs in and follows redirections as link_rules.h permits, keeps the session alive.
-// Part of RtpConnection.
+// RtspSession: the video of an RTSP camera (RFC 2326). Packets come within the RTSP connection
+// (rtsp_link.h) or by UDP; over TLS (rtsps://) only within. Logs in and follows redirections as
+// link_rules.h permits, and keeps the session alive. Part of RtpConnection.
 
 #include <gst/rtsp/gstrtspdefs.h>
 
@@ -24,7 +24,7 @@ class RtspMessage;
 
 class RtspSession : public RtpTransport {
  public:
-  // options.url without credentials; options must outlive the session.
+  // options.url must be without credentials. options must outlive the session.
   explicit RtspSession(const RtpSourceOptions& options);
   ~RtspSession() override;
   RtspSession(const RtspSession&) = delete;
@@ -60,9 +60,10 @@ class RtspSession : public RtpTransport {
   [[nodiscard]] ReadStatus send(const Request& request, double deadline_s, std::string* error);
   [[nodiscard]] ReadStatus redirect(const std::string& location, std::string* error);
   [[nodiscard]] ReadStatus log_in(RtspMessage* answer, bool refused, std::string* error);
-  // Empty: accepted; or why not.
+  // Empty if the challenge was accepted, else why not.
   [[nodiscard]] std::string accept_challenge(RtspMessage* answer);
-  // After PLAY. What came within the connection: kOk with a packet of the video; kTimeout: none so far.
+  // After PLAY, for what comes within the connection. kOk: a packet of the video. kTimeout: none so
+  // far.
   [[nodiscard]] ReadStatus next_packet(double wait_s, RtspFraming::Item* packet,
                                        std::string* error);
   [[nodiscard]] ReadStatus take_message(std::string_view text, std::string* error);
@@ -76,20 +77,20 @@ class RtspSession : public RtpTransport {
   std::string url_;          // after redirections
   bool redirected_ = false;  // by the latest answer
   bool logs_in_ = true;      // at url_
-  std::string base_url_;     // what the description's addresses are relative to
-  std::string session_url_;  // what PLAY is for; empty: nothing to tear down
-  std::string session_;      // its name, as the camera gave it
+  std::string base_url_;     // base of the description's relative addresses
+  std::string session_url_;  // URL of PLAY; empty: nothing to tear down
+  std::string session_;      // session name, as given by the camera
   double ping_period_s_ = 0;
   double ping_at_s_ = 0;
   GstRTSPMethod ping_ = GST_RTSP_OPTIONS;
-  RtspLogin login_;                      // to this connection
+  RtspLogin login_;                      // for this connection
   int requests_ = 0;                     // sent
   bool pinged_again_ = false;            // with a new login
-  double next_look_s_ = 0;               // by UDP: for what the camera says
-  std::optional<std::uint32_t> source_;  // SSRC, as the answer to SETUP has it
-  int first_port_ = 0;                   // RTP's; RTCP's is the next
-  std::mutex mutex_;                     // lets interrupt() see whether the ports are there
-  std::unique_ptr<RtpPorts> ports_;      // by UDP only
+  double next_look_s_ = 0;               // with UDP: next reading of the camera's messages
+  std::optional<std::uint32_t> source_;  // SSRC, from the answer to SETUP
+  int first_port_ = 0;                   // for RTP; RTCP has the next one
+  std::mutex mutex_;                     // so that interrupt() sees if the ports exist
+  std::unique_ptr<RtpPorts> ports_;      // with UDP only
   RtspLink link_;
 };
 

@@ -3,10 +3,11 @@
 namespace alidade {
 namespace {
 
-// Faults for which no authority vouches; the last where one of the same name has another key.
+// Faults if no authority vouches for the certificate. The second comes if one of the same name has
+// another key.
 constexpr int kUnknownIssuer = G_TLS_CERTIFICATE_UNKNOWN_CA | G_TLS_CERTIFICATE_GENERIC_ERROR;
 
-// What is wrong with a certificate, the worst first.
+// What is wrong with a certificate, the worst fault first.
 std::string fault_of(int faults, const std::string& file) {
   if ((faults & kUnknownIssuer) != 0) {
     return file.empty() ? "no authority that is known here has signed it"
@@ -46,7 +47,7 @@ void RtspTls::judge(GTlsConnection* connection) {
   g_signal_connect(connection, "accept-certificate", G_CALLBACK(&RtspTls::accept), this);
 }
 
-// Asked about a certificate that did not pass.
+// Called for a certificate that GLib does not accept by itself.
 gboolean RtspTls::accept(GTlsConnection* /*tls*/, GTlsCertificate* certificate,
                          GTlsCertificateFlags faults, gpointer self) {
   auto* tls = static_cast<RtspTls*>(self);
@@ -66,7 +67,7 @@ ReadStatus RtspTls::refusal(std::string* error) const {
   if (faults_ == 0) return ReadStatus::kOk;
   *error = "the camera's certificate is refused: " + fault_of(faults_, certificate_file_) +
            "; if it is the camera's, save it as a PEM file and set certificate_file";
-  // This machine's clock may not be set yet.
+  // Other faults may be due to a clock of this machine that is not set yet.
   constexpr int kForGood = kUnknownIssuer | G_TLS_CERTIFICATE_BAD_IDENTITY;
   return (faults_ & kForGood) != 0 ? ReadStatus::kFailed : ReadStatus::kDisconnected;
 }

@@ -1,6 +1,5 @@
 #pragma once
-// RtspTls: what RTSP over TLS (rtsps://) asks of a connection, beside RTSP itself: whose certificate is trusted. Part of
-// RtspLink.
+// RtspTls: certificate checks for RTSP over TLS (rtsps://). Part of RtspLink.
 
 #include <gio/gio.h>
 
@@ -24,12 +23,12 @@ class RtspTls {
   RtspTls(const RtspTls&) = delete;
   RtspTls& operator=(const RtspTls&) = delete;
 
-  // Before a connection is made. kFailed: *error is one line.
+  // Call it before connecting. kFailed: *error is one line.
   [[nodiscard]] ReadStatus prepare(std::string* error);
-  // As its greeting begins. It must not outlive this object.
+  // Call it at the start of the handshake. The connection must not outlive this object.
   void judge(GTlsConnection* connection);
 
-  // Why it could not connect, if the certificate was refused: then *error is one line. kOk: it was not.
+  // If the certificate was refused: the status, and *error is one line. kOk: it was not.
   [[nodiscard]] ReadStatus refusal(std::string* error) const;
 
  private:
@@ -37,8 +36,8 @@ class RtspTls {
                          GTlsCertificateFlags faults, gpointer self);
 
   std::string certificate_file_;
-  std::unique_ptr<GTlsDatabase, GObjectUnref> known_;  // what is in it
-  // GTlsCertificateFlags of the certificate that was refused. GLib asks on a thread of its own.
+  std::unique_ptr<GTlsDatabase, GObjectUnref> known_;  // the certificates of certificate_file_
+  // GTlsCertificateFlags of the refused certificate. GLib calls accept() on a thread of its own.
   std::atomic<int> faults_{0};
 };
 

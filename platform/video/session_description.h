@@ -1,6 +1,5 @@
 #pragma once
-// What a session description (SDP, RFC 8866) says about the first video in it, by GStreamer's parser.
-// Text in, value or nothing out.
+// Reads the first video of a session description (SDP, RFC 8866) by GStreamer's parser. No I/O.
 
 #include <optional>
 #include <string>
@@ -9,16 +8,16 @@
 namespace alidade {
 
 struct VideoDescription {
-  std::string address;    // to listen to; 0.0.0.0 if none is given
-  int port = 0;           // UDP, for RTP; 0: to be agreed upon by RTSP
-  int payload_type = -1;  // the first that the m= line names, and the one that is read; -1: none
-  std::string control;    // a=control of the video; empty if not given
-  std::string session_control;  // and of the session
-  // Who sends, as a=source-filter has it (RFC 4570); empty: not told. Nothing but `incl` counts.
+  std::string address;          // address to listen to; 0.0.0.0 if none is given
+  int port = 0;                 // UDP port for RTP; 0: to be agreed on by RTSP
+  int payload_type = -1;        // the first in the m= line, which is the one read; -1: none
+  std::string control;          // a=control of the video; empty if not given
+  std::string session_control;  // a=control of the session
+  // Senders by a=source-filter (RFC 4570); empty: not given. Only `incl` is considered.
   std::vector<std::string> senders;
 };
 
-// Nothing if the text describes no video.
+// nullopt if the text describes no video.
 [[nodiscard]] std::optional<VideoDescription> find_video(const std::string& sdp);
 
 }  // namespace alidade

@@ -1,15 +1,13 @@
 #pragma once
-// StampGuard: which of a stream's time stamps can be true.
+// StampGuard: decides which of a stream's time stamps can be true.
 //
-// Pictures are sent in the order in which they are taken, and none comes before it was taken. So each stamp is greater than
-// the one before, and receive - sender falls below the least so far by no more than kEarly_s, which is more than a
-// network's delay changes by; but for a backlog, which comes at once and in steps of the usual length.
-// A stamp that is not so
-//   is bad   by itself: its picture has none;
-//   jumped   as the kAgreeing-th in a row that go on from each other like that: the sender's clock is another by now;
-//            or, where they are on the line that held before the last good one, that one was bad, and these are good.
-// How much later than before a picture comes tells nothing: it may have waited.
-// Fixed memory, no allocation, no exceptions. Seconds.
+// Pictures are sent in order of capture and never arrive before it. So each stamp exceeds the one
+// before, and receive - sender falls below its minimum so far by at most kEarly_s, more than a
+// network's delay varies. Exception: a backlog, which arrives at once, with steps of the usual
+// length. Any other stamp is bad, and its picture gets none. When kAgreeing bad stamps in a row
+// follow each other by this rule, the sender's clock was changed, and the last is kJumped. If they
+// lie on the line before the last good stamp, though, that one was wrong, and the last is kGood. A
+// late picture shows nothing: it may have waited. Fixed memory, no allocation, no exceptions.
 
 #include <algorithm>
 #include <cmath>
@@ -24,7 +22,7 @@ class StampGuard {
   static constexpr double kEarly_s = 0.3;
   static constexpr int kAgreeing = 3;
 
-  // The first is good whatever it is.
+  // Starts anew; the next stamp is good whatever it is.
   void restart() { line_ = other_ = Line{}; }
 
   [[nodiscard]] Verdict judge(double receive_s, double sender_s) {
@@ -43,22 +41,22 @@ class StampGuard {
     return came_back ? Verdict::kGood : Verdict::kJumped;
   }
 
-  // Where the next stamp would be if its picture were as late as the last good one's; 0 before the first.
+  // The next stamp if its picture is as late as that of the last good one; 0 before the first.
   [[nodiscard]] double expected_s(double receive_s) const {
     return line_.items == 0 ? 0 : line_.last_s + (receive_s - line_.received_s);
   }
 
  private:
   static constexpr double kEarlyAtFirst_s = 10;  // while no step is known
-  static constexpr double kLongStep = 4;         // times the usual
+  static constexpr double kLongStep = 4;         // times the usual step
 
   struct Line {
     int items = 0;
     double received_s = 0;
     double last_s = 0;
-    double least_s = 0;         // receive - sender
-    double level_before_s = 0;  // the same of the last stamp but one
-    double step_s = 0;          // between two stamps, without the long ones; 0: not known
+    double least_s = 0;         // least receive - sender
+    double level_before_s = 0;  // receive - sender of the last stamp but one
+    double step_s = 0;          // usual step between stamps, without long ones; 0: not known
 
     [[nodiscard]] bool goes_on(double receive_s, double sender_s) const {
       const double step = sender_s - last_s;
@@ -79,7 +77,7 @@ class StampGuard {
   };
 
   Line line_;
-  Line other_;  // that the last ones, all bad so far, would be on
+  Line other_;  // line through the latest stamps, all bad so far
 };
 
 }  // namespace alidade

@@ -11,8 +11,8 @@ extern "C" {
 namespace alidade {
 namespace {
 
-// Matroska wants H.264's and H.265's parameter sets in its header; where the sender's description lacks them, the
-// first key frame holds them.
+// Matroska needs H.264's and H.265's parameter sets in its header. If the sender's description
+// lacks them, they are in the first key frame.
 int fill_extradata(const AVPacket& key_frame, AVCodecParameters* parameters) {
   AVBSFContext* filter = nullptr;
   int code = av_bsf_alloc(av_bsf_get_by_name("extract_extradata"), &filter);
@@ -97,7 +97,7 @@ int StreamCopy::create(const std::string& path, const AVCodecParameters& paramet
   }
   parameters_->width = width;
   parameters_->height = height;
-  if (parameters_->codec_id != AV_CODEC_ID_RAWVIDEO) {  // whose tag is its pixel format
+  if (parameters_->codec_id != AV_CODEC_ID_RAWVIDEO) {  // its tag is the pixel format
     parameters_->codec_tag = 0;
   }
   const bool has_sets =
@@ -152,7 +152,7 @@ bool StreamCopy::add(const std::string& path, const AVCodecParameters& parameter
     const double since_first_s = receive_time_s - first_receive_time_s_;
     const auto pts =
         static_cast<std::int64_t>(std::llround(since_first_s / av_q2d(stream.time_base)));
-    last_pts_ = std::max(last_pts_ + 1, pts);  // each picture needs its own
+    last_pts_ = std::max(last_pts_ + 1, pts);  // timestamps must differ
     packet->pts = last_pts_;
     packet->dts = last_pts_;
     packet->duration = 0;
@@ -161,7 +161,7 @@ bool StreamCopy::add(const std::string& path, const AVCodecParameters& parameter
     code = av_write_frame(format_, packet.get());
   }
   if (code >= 0) {
-    code = format_->pb->error;  // flushing the buffer reports here only
+    code = format_->pb->error;  // a failure of the flush is reported only here
   }
   if (code < 0) {
     *error = "cannot write " + path + ": " + av_error_text(code);

@@ -1,10 +1,9 @@
 #pragma once
-// StreamCopy: stores compressed pictures, or uncompressed grey ones, in a Matroska file as they are.
-// Part of the sources that copy.
-//
-// The file's timestamps are arrival times, milliseconds since the first picture: they go on over a
-// reconnection, whatever the sender's clock does (frames.csv holds the exact stamps).
-// Clusters are closed and flushed after a second at most: a kill loses no more.
+// StreamCopy: stores compressed pictures, or uncompressed grey ones, unchanged in a Matroska file.
+// Part of the sources that copy. The file's timestamps are arrival times, in milliseconds since the
+// first picture. They continue over a reconnection, whatever the sender's clock does (frames.csv
+// has the exact stamps). Clusters are closed and flushed after at most a second: a kill loses no
+// more.
 
 #include <cstddef>
 #include <string>
@@ -13,11 +12,11 @@
 
 namespace alidade {
 
-// Of pictures that no libav demuxer describes: AV_CODEC_ID_MJPEG, or AV_CODEC_ID_RAWVIDEO for 8-bit luma
-// without gaps between its rows.
+// Parameters of pictures without a libav demuxer: AV_CODEC_ID_MJPEG, or AV_CODEC_ID_RAWVIDEO for
+// 8-bit luma without gaps between rows.
 [[nodiscard]] CodecParametersPtr picture_parameters(AVCodecID codec);
 
-// Room for such a picture, each of which can be decoded by itself; null without memory.
+// A packet with room for an independently coded picture; null without memory.
 [[nodiscard]] PacketPtr make_picture_packet(std::size_t bytes);
 
 class StreamCopy {
@@ -27,12 +26,12 @@ class StreamCopy {
   StreamCopy(const StreamCopy&) = delete;
   StreamCopy& operator=(const StreamCopy&) = delete;
 
-  // Adds a picture, the first time making the file. A connection whose codec or picture size differs
-  // from the first one's cannot be continued. False: *error is one line.
+  // Adds a picture; the first call creates the file. A connection with another codec or picture
+  // size than the first cannot be continued. On false, *error is one line.
   [[nodiscard]] bool add(const std::string& path, const AVCodecParameters& parameters, int width,
                          int height, const AVPacket& picture, double receive_time_s,
                          std::string* error);
-  // Whether the last picture was not added because of that; the file can still go on.
+  // True if the last picture was not added for that reason; the file can still go on.
   [[nodiscard]] bool is_another_stream() const { return another_; }
 
  private:
@@ -42,7 +41,7 @@ class StreamCopy {
   AVFormatContext* format_ = nullptr;
   bool header_written_ = false;
   bool another_ = false;
-  CodecParametersPtr parameters_;  // of the connection that began the file
+  CodecParametersPtr parameters_;  // of the connection that started the file
   double first_receive_time_s_ = 0;
   std::int64_t last_pts_ = -1;
 };

@@ -43,9 +43,9 @@ bool StreamFilter::is_own_source(std::uint32_t source) const {
   return source == source_ || source == agreed_ || (source == left_ && !two_send_);
 }
 
-// Whether the source that is followed has been silent for long enough.
+// True if the followed source has been silent for long enough.
 bool StreamFilter::began_anew(const RtpHeader& header, double arrival_s) {
-  constexpr double kTimes = 2;  // the usual
+  constexpr double kTimes = 2;  // the usual time between pictures
   if (holds_ && holds_->source != header.source) drop_held();
   if (!holds_ || holds_->timestamp != header.timestamp) ++held_pictures_;
   holds_ = header;

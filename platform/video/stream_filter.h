@@ -1,14 +1,13 @@
 #pragma once
-// StreamFilter: which RTP and RTCP packets of a channel are of the stream that the session agreed
-// upon.
+// StreamFilter: selects the RTP and RTCP packets that belong to the agreed stream.
 //
 //   payload type  the description's. Packets of another (metadata, audio, repair) are foreign,
-//                 whatever time they bear.
-//   source        the SSRC that the camera's answers name, if it comes; else the first that comes.
-//                 Packets of another are held back. Where the one before goes on, they were foreign.
-//                 Where it is silent while the other begins kPictures pictures, or for kSilent_s, the
-//                 other is the sender that began anew, and what was held back is its beginning.
-//                 One that was left so and comes back is followed for good: two are sending.
+//                 whatever their time.
+//   source        the SSRC in the camera's answers if it comes, else the first that comes. Packets
+//                 of another are held back. If the current source goes on, they were foreign. If
+//                 it is silent while the other starts kPictures pictures, or for kSilent_s, the
+//                 other is the restarted sender, and the held packets are its start. If a source
+//                 left in this way returns, it is followed for good: there are two senders.
 //   reports       of a foreign source are foreign.
 // Memory: kMostHeld bytes. One thread at a time.
 
@@ -28,26 +27,27 @@ class StreamFilter {
  public:
   static constexpr double kSilent_s = 1;
   static constexpr int kPictures = 3;
-  static constexpr std::size_t kMostHeld = 4 << 20;  // bytes; the oldest are left out
+  static constexpr std::size_t kMostHeld = 4 << 20;  // bytes; beyond that the oldest are left out
 
   struct Held {
     std::vector<std::uint8_t> bytes;
     double arrival_s = 0;
   };
 
-  // payload_type < 0: any. source: as the camera's answers have it.
+  // payload_type < 0: any. source: from the camera's answers.
   explicit StreamFilter(int payload_type = -1, std::optional<std::uint32_t> source = std::nullopt)
       : payload_type_(payload_type), agreed_(source) {}
 
-  // Whether it is the stream's own, RTP or RTCP. Each packet, in the order of arrival. What is
-  // neither is not judged: true. After false, what release() gives comes first.
+  // Call it for each packet, RTP or RTCP, in order of arrival. True if the packet belongs to the
+  // stream or is neither RTP nor RTCP. After false, take the packets of release() first.
   [[nodiscard]] bool takes(const std::uint8_t* data, std::size_t size, double arrival_s);
 
-  // The next packet that was held back and is the stream's own after all, in the order of arrival.
+  // The next held packet that belongs to the stream after all, in order of arrival.
   [[nodiscard]] std::optional<Held> release();
 
-  // Foreign packets of the own source, left out since the own packet before the last, that were
-  // numbered between these two: they were not lost. For each, in order of arrival: use(header).
+  // Calls use(header), in order of arrival, for foreign packets of the stream's source that came
+  // since the last own packet but one and have sequence numbers between the last two. They were not
+  // lost.
   template <class Use>
   void for_each_between(Use use) const {
     const int span = behind(last_sequence_);
@@ -59,7 +59,7 @@ class StreamFilter {
 
   [[nodiscard]] std::optional<std::uint32_t> source() const { return source_; }
   [[nodiscard]] std::int64_t foreign() const { return foreign_; }
-  // What they are, in a person's words; empty: none came.
+  // A description of the last foreign packets; empty: none came.
   [[nodiscard]] const std::string& foreign_kind() const { return kind_; }
 
  private:
@@ -76,19 +76,19 @@ class StreamFilter {
 
   int payload_type_;
   std::optional<std::uint32_t> agreed_;
-  std::optional<std::uint32_t> source_;          // followed
-  std::optional<std::uint32_t> left_;            // followed before it
-  std::optional<std::uint32_t> foreign_source_;  // the last
+  std::optional<std::uint32_t> source_;          // the source followed
+  std::optional<std::uint32_t> left_;            // the source followed before it
+  std::optional<std::uint32_t> foreign_source_;  // the last foreign source
   bool two_send_ = false;
-  std::optional<double> heard_s_;  // that source; before there is one: the first packet
-  std::uint32_t picture_ = 0;      // of that source, its time stamp
+  std::optional<double> heard_s_;  // last packet of source_; without a source: the first packet
+  std::uint32_t picture_ = 0;      // RTP timestamp of its current picture
   double picture_began_s_ = 0;
-  double usual_s_ = 0;  // from picture to picture
+  double usual_s_ = 0;  // usual time from picture to picture
 
-  // Of one source, that may be the stream's.
+  // Held packets of one source that may become the stream's.
   std::deque<Held> held_;
   std::size_t held_bytes_ = 0;
-  std::optional<RtpHeader> holds_;  // the last
+  std::optional<RtpHeader> holds_;  // the last of them
   int held_pictures_ = 0;
   bool release_ = false;
 
@@ -96,7 +96,7 @@ class StreamFilter {
   std::uint16_t last_sequence_ = 0;
   std::array<RtpHeader, 32> aside_{};
   std::size_t asides_ = 0;
-  bool asides_are_old_ = false;  // an own packet came behind them
+  bool asides_are_old_ = false;  // an own packet came after them
   std::int64_t foreign_ = 0;
   std::string kind_;
 };

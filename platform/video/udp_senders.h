@@ -1,6 +1,7 @@
 #pragma once
-// UdpSenders: whose datagrams a socket takes, by IP address: anybody can send to an open port, and needs no password for it.
-// A port is no part of it: cameras, and what stands in between, send from any. IPv4 and IPv6. No I/O; one thread at a time.
+// UdpSenders: whose datagrams a socket accepts, by IP address, as anyone can send to an open port
+// without a password. The port is ignored: cameras and devices on the way send from any. IPv4 and
+// IPv6. No I/O; one thread at a time.
 
 #include <sys/socket.h>
 
@@ -16,19 +17,19 @@ class UdpSenders {
  public:
   // False: not a numeric address.
   [[nodiscard]] bool add(const std::string& address);
-  // None was added: anybody's are taken.
+  // True if none was added: all senders are accepted.
   [[nodiscard]] bool empty() const { return addresses_.empty(); }
-  // The numeric addresses, as they were added.
+  // The numeric addresses, as added.
   [[nodiscard]] const std::vector<std::string>& names() const { return names_; }
 
-  // Whether this one's datagrams are taken; counts those that are not.
+  // True if datagrams from this address are accepted; counts the others.
   [[nodiscard]] bool take(const sockaddr_storage& from);
   [[nodiscard]] std::int64_t foreign() const { return foreign_; }
-  // Whose they are, in a person's words; empty: none came.
+  // A description of the others; empty: none came.
   [[nodiscard]] std::string foreign_kind() const;
 
  private:
-  using Bytes = std::array<std::uint8_t, 16>;  // of IPv6; IPv4's as mapped there
+  using Bytes = std::array<std::uint8_t, 16>;  // IPv6, or IPv4 mapped to IPv6
   static std::optional<Bytes> bytes_of(const sockaddr_storage& address);
 
   std::vector<Bytes> addresses_;

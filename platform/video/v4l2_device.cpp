@@ -17,8 +17,9 @@
 namespace alidade {
 namespace {
 
-constexpr std::uint32_t kBuffers = 8;     // asked for; the driver may give others
-constexpr std::size_t kDriversShare = 2;  // buffers that stay with the driver: one filled, one next
+constexpr std::uint32_t kBuffers = 8;     // requested; the driver may give another number
+constexpr std::size_t kDriversShare = 2;  // buffers that stay with the driver: one being filled,
+                                          // one next
 
 int call(int fd, unsigned long request, void* argument) {
   int result = 0;
@@ -86,7 +87,7 @@ std::string v4l2_call_error(const char* what, int error_number, const std::strin
 
 V4l2Device::Mapping::~Mapping() { ::munmap(data_, size_); }
 
-// The system puts the copy in place in one step, which a thread that reads does not notice.
+// mremap() replaces the memory in one step, unnoticed by a thread that reads it.
 void V4l2Device::Mapping::detach() {
   void* copy = ::mmap(nullptr, size_, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
   if (copy == MAP_FAILED) {
@@ -251,7 +252,7 @@ V4l2Device::Result V4l2Device::set_format(std::uint32_t fourcc, const V4l2Wish& 
   stride_ = picture.bytesperline;
   const std::size_t least = raw_picture_bytes(format_, width_, 1, 0);
   if (format_ != V4l2Format::kMjpg && stride_ < least) {
-    stride_ = least;  // some drivers say nothing
+    stride_ = least;  // some drivers leave it 0
   }
   return Result::kOk;
 }
@@ -351,7 +352,7 @@ V4l2Device::Result V4l2Device::dequeue(Buffer* buffer) {
   return Result::kOk;
 }
 
-// What the driver does not take back shows in its next poll.
+// If the driver does not take the buffer back, the next poll shows it.
 void V4l2Device::give_back(std::uint32_t index) {
   const std::lock_guard<std::mutex> lock(mutex_);
   --held_;

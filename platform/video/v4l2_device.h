@@ -1,11 +1,9 @@
 #pragma once
-// V4l2Device: one opening of a V4L2 capture device, from negotiation to closing: buffers that the
-// driver fills are taken out, lent and given back. Part of V4l2Source.
-//
-// Single-planar capture by mmap streaming. A buffer goes back to the driver when the last owner of what
-// hold() gave is gone, on whichever thread. What is still held when the device closes becomes memory
-// of its own in the same place: the driver's would keep the device open, and with it, after an unplugging,
-// the number in /dev/video*.
+// V4l2Device: one opening of a V4L2 capture device, from negotiation to closing: dequeues filled
+// buffers, lends them and gives them back. Part of V4l2Source. Single-planar capture by mmap
+// streaming. A buffer goes back to the driver when the last owner of hold()'s result is gone, on
+// any thread. Buffers held when the device closes become ordinary memory in the same place: the
+// driver's memory would keep the device open and, after an unplugging, its number in /dev/video*.
 // One thread opens, dequeues and closes; owners may end on any.
 
 #include <sys/types.h>
@@ -22,7 +20,7 @@
 
 namespace alidade {
 
-// What a call that failed with this errno means for the person: one line without the device's name.
+// The message to the user for a failed call with this errno: one line without the device's name.
 [[nodiscard]] std::string v4l2_call_error(const char* what, int error_number,
                                           const std::string& path);
 
@@ -30,9 +28,9 @@ class V4l2Device : public std::enable_shared_from_this<V4l2Device> {
  public:
   enum class Result {
     kOk,
-    kNothing,  // no buffer is filled
-    kLost,     // gone, busy or out of order: may be well later; see error()
-    kDenied,  // no permission; for a moment also to a device that has just been plugged in; see error()
+    kNothing,  // no buffer is filled yet
+    kLost,     // gone, busy or out of order; may recover; see error()
+    kDenied,   // no permission; also temporary for a device just plugged in; see error()
     kUnusable  // will not work as it is; see error()
   };
 
@@ -54,15 +52,15 @@ class V4l2Device : public std::enable_shared_from_this<V4l2Device> {
   [[nodiscard]] Result open(const std::string& path, const V4l2Wish& wish);
   void close();
 
-  // Polls readable when a buffer is filled.
+  // Readable in poll() when a buffer is filled.
   [[nodiscard]] int fd() const { return device_.get(); }
-  // On kOk the next call is hold().
+  // After kOk call hold() next.
   [[nodiscard]] Result dequeue(Buffer* buffer);
   [[nodiscard]] std::shared_ptr<const void> hold(std::uint32_t index);
-  // Whether the driver can do without what is held now for as long as it takes.
+  // True if the driver can do without the buffers held now, for any time.
   [[nodiscard]] bool can_lend();
 
-  // What was negotiated.
+  // The negotiated format.
   [[nodiscard]] V4l2Format format() const { return format_; }
   [[nodiscard]] int width() const { return width_; }    // px
   [[nodiscard]] int height() const { return height_; }  // px
@@ -106,9 +104,9 @@ class V4l2Device : public std::enable_shared_from_this<V4l2Device> {
   V4l2Format format_ = V4l2Format::kGrey;
   int width_ = 0;
   int height_ = 0;
-  std::size_t stride_ = 0;  // bytes; of raw formats
+  std::size_t stride_ = 0;  // bytes; for raw formats
 
-  // Guards device_ against an owner that ends while the device is closed.
+  // Guards device_ against an owner that ends while the device is being closed.
   std::mutex mutex_;
   FileDescriptor device_;
   std::size_t held_ = 0;                            // guarded by mutex_

@@ -86,7 +86,7 @@ std::string sizes_text(const V4l2Offer& offer) {
   });
 }
 
-// Of the sizes that fit the wish.
+// Rates of the sizes that fit the wish.
 std::string rates_text(const V4l2Offer& offer, const V4l2Wish& wish) {
   std::vector<std::string> rates;
   for (const V4l2Size& size : offer.sizes) {
@@ -160,7 +160,7 @@ std::optional<std::uint32_t> choose_format(const std::vector<V4l2Offer>& offers,
       }
     }
   }
-  V4l2Wish said;  // the wish as far as it has been looked at, for the message
+  V4l2Wish said;  // the part of the wish considered so far, for the message
   said.format = wish.format;
   if (fitting.empty()) {
     *error = "offers " +
@@ -200,7 +200,7 @@ std::optional<std::uint32_t> choose_format(const std::vector<V4l2Offer>& offers,
   if (fitting.empty()) {
     return refuse(before, [&](const V4l2Offer& offer) { return rates_text(offer, wish); });
   }
-  // What the device tells goes before what it leaves open.
+  // Formats with listed sizes take precedence.
   const auto told = std::find_if(fitting.begin(), fitting.end(),
                                  [](const V4l2Offer& offer) { return !offer.sizes.empty(); });
   return (told == fitting.end() ? fitting.front() : *told).fourcc;

@@ -24,7 +24,7 @@
 namespace alidade {
 namespace {
 
-constexpr double kLongestPoll_s = 3600;  // keeps milliseconds within an int
+constexpr double kLongestPoll_s = 3600;  // so that milliseconds fit into an int
 
 std::string_view bytes_of(const V4l2Device::Buffer& buffer) {
   return {reinterpret_cast<const char*>(buffer.data), buffer.bytes};
@@ -81,24 +81,24 @@ class V4l2Source : public FrameSource {
   std::string error_;
   bool failed_ = false;
   bool worked_ = false;  // a frame has come
-  bool lost_ = false;    // kDisconnected has been said
+  bool lost_ = false;    // kDisconnected was reported
   Backoff backoff_{options_.max_backoff_s};
   double next_try_s_ = 0;
-  std::shared_ptr<V4l2Device> device_;  // null while there is no connection
+  std::shared_ptr<V4l2Device> device_;  // null without a connection
   V4l2Stamps stamps_;
-  double last_frame_s_ = 0;     // when it was delivered; or the connection's beginning
-  bool damaged_since_ = false;  // the last frame
+  double last_frame_s_ = 0;     // time of the last delivery, or start of the connection
+  bool damaged_since_ = false;  // damaged buffers came since the last frame
   bool restarted_ = true;
   std::int64_t next_frame_ = 0;
   JpegDecoder decoder_;
   LumaPool pool_;
-  CodecParametersPtr parameters_;  // of what is stored: JPEG as it came, else uncompressed luma
+  CodecParametersPtr parameters_;  // of the stored pictures: JPEG unchanged, or uncompressed luma
   StreamCopy copy_;
 };
 
 void V4l2Source::close() {
   if (device_) {
-    device_->close();  // lent buffers keep the object
+    device_->close();  // lent buffers keep the object alive
     device_.reset();
   }
 }
@@ -112,7 +112,7 @@ ReadStatus V4l2Source::lose(const std::string& error) {
   return ReadStatus::kDisconnected;
 }
 
-// Until fd (if not negative) has something, or end_s, or stop(). False: it has nothing yet.
+// Waits until fd (if not negative) is ready, end_s or stop(). False: fd is not ready.
 bool V4l2Source::wait(int fd, double end_s, bool* gone) {
   const double left_s = std::clamp(end_s - monotonic_now_s(), 0.0, kLongestPoll_s);
   std::array<pollfd, 2> polled = {{{stop_event_.get(), POLLIN, 0}, {fd, POLLIN, 0}}};
@@ -185,7 +185,7 @@ ReadStatus V4l2Source::read(Frame& frame, double timeout_s) {
   }
 }
 
-// Of the next buffer; kTimeout if that is none to deliver.
+// Makes a frame from the next buffer; kTimeout if it gives none.
 ReadStatus V4l2Source::take(Frame& frame) {
   V4l2Device::Buffer buffer;
   const V4l2Device::Result result = device_->dequeue(&buffer);
@@ -233,7 +233,7 @@ ReadStatus V4l2Source::take(Frame& frame) {
   return ReadStatus::kOk;
 }
 
-// Size and, if wanted, luma. False: the buffer does not hold a whole picture.
+// Size and, if wanted, luma. False: the buffer does not hold a complete picture.
 bool V4l2Source::take_picture(const V4l2Device::Buffer& buffer,
                               const std::shared_ptr<const void>& held, Picture* picture) {
   const V4l2Format format = device_->format();

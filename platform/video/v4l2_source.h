@@ -1,22 +1,12 @@
 #pragma once
-// open_v4l2(): a camera on this machine: USB (UVC), CSI, frame grabbers; any single-planar V4L2 capture
-// device (v4l2_device.h), with GREY, NV12, YUYV, UYVY or MJPG pictures.
-//
-// No thread of its own: the kernel stamps and queues, read() takes out and decodes.
-// - receive_time_s: the driver's stamp if it is of CLOCK_MONOTONIC and not in the future, at the
-//   start or at the end of the frame as the driver has it; else the moment read() took the buffer out
-//   (v4l2_stamps.h). sequence: the driver's count; a gap counts as dropped.
-// - GREY and NV12: luma is the driver's buffer, without a copy; it goes back when the frame's owner
-//   dies, also after this source. While too few buffers are left for the driver, luma is a copy.
-//   YUYV and UYVY: one pass takes the luma out. MJPG: libjpeg-turbo.
-// - Buffers with an error flag, short and undecodable ones are skipped and counted as damaged; a
-//   buffer that comes twice is skipped.
-// - copy_to: each delivered picture is also stored in that Matroska file: MJPG as it came, others as
-//   uncompressed luma. The file goes on over reconnections.
-// kDisconnected: unplugged, busy, not there, silent for timeout_s. kFailed: no permission, no capture
-// device, not the format, size and rate wanted; said only until the first frame has come, as a device
-// that is plugged in again may be all that for a moment. No permission counts only at the first try: a
-// device that is plugged in later gets its group a moment after its name.
+// open_v4l2(): a camera on this machine (USB/UVC, CSI, frame grabber): any single-planar V4L2
+// capture device (v4l2_device.h) with GREY, NV12, YUYV, UYVY or MJPG pictures. It has no thread:
+// the kernel stamps and queues, read() dequeues and decodes. receive_time_s: the driver's stamp if
+// it is valid, else the moment of dequeueing; sequence: the driver's count (v4l2_stamps.h). Luma of
+// GREY and NV12 is the driver's buffer, without copy. It is returned when the frame's owner dies,
+// even after this source; if the driver has too few buffers left, luma is a copy. YUYV and UYVY:
+// one pass extracts the luma. MJPG: libjpeg-turbo. Buffers with an error flag, short ones and
+// undecodable ones are skipped and counted as damaged. Statuses and copies: docs/derivations.md.
 
 #include <cstdint>
 #include <memory>
@@ -31,8 +21,8 @@ struct V4l2SourceOptions {
   std::string device;  // /dev/video0
   V4l2Wish wish;
   bool decode = true;        // false: Frame::luma stays null
-  double timeout_s = 3;      // without a picture for so long, the device counts as lost
-  double max_backoff_s = 5;  // longest pause between two tries
+  double timeout_s = 3;      // without a picture for so long, the device is lost
+  double max_backoff_s = 5;  // longest pause between two attempts
   std::string copy_to;       // video.mkv to store the pictures in; empty: none
 };
 

@@ -1,16 +1,14 @@
 #pragma once
-// V4l2Stamps: what the kernel says of the buffers of one connection, turned into receive times and
+// V4l2Stamps: converts the kernel's stamps of one connection's buffers to receive times and
 // sequence numbers, each buffer once and in order.
-//
-// - Receive time: the driver's stamp where it is of CLOCK_MONOTONIC (V4L2_BUF_FLAG_TIMESTAMP_
-//   MONOTONIC), taken at the start of exposure or at the end of the frame as the driver says; which
-//   of the two is a constant, part of the clock offset that is calibrated. A stamp of
-//   another clock (UNKNOWN, COPY), none, and one later than the moment the buffer was taken out, which
-//   cannot be an arrival, give way to that moment.
-// - Sequence: unwrapped from the kernel's 32 bits. A gap is what the driver lost or had no free buffer
-//   for; it is counted. A number that goes back means that the driver began anew. The number of the
-//   buffer before once more means the same place in time again: a duplicate. A driver that
-//   begins with several of those does not count, and has no sequence numbers until it does.
+// - Receive time: the driver's stamp if it is of CLOCK_MONOTONIC
+//   (V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC), at the start of exposure or the end of the frame, as the
+//   driver says. The difference is a constant, part of the calibrated clock offset. Without such a
+//   stamp (UNKNOWN, COPY, none), or if it is later than dequeueing, it is the moment of dequeueing.
+// - Sequence: the kernel's 32-bit count, unwrapped. A gap is counted: buffers that the driver lost
+//   or had no room for. A number that goes back: the driver started anew. A repeated number is a
+//   duplicate. A driver that starts with several repeats does not count, and has no sequence
+//   numbers until it does.
 // One thread, no allocation.
 
 #include <linux/videodev2.h>
@@ -27,14 +25,14 @@ class V4l2Stamps {
  public:
   struct Stamp {
     double receive_time_s = 0;
-    StampedAt stamped_at = StampedAt::kArrival;  // what that is
+    StampedAt stamped_at = StampedAt::kArrival;  // what receive_time_s refers to
     std::optional<std::int64_t> sequence;
-    std::int64_t lost = 0;   // buffers between this one and the one before
-    bool duplicate = false;  // of the one before
-    bool anew = false;       // sequence does not go on from the one before
+    std::int64_t lost = 0;   // buffers missing before this one
+    bool duplicate = false;  // of the previous buffer
+    bool anew = false;       // sequence does not continue from the previous buffer
   };
 
-  // Of each buffer, damaged ones included. dequeued_s: CLOCK_MONOTONIC.
+  // Call it for each buffer, including damaged ones. dequeued_s: CLOCK_MONOTONIC.
   [[nodiscard]] Stamp update(std::uint32_t sequence, std::uint32_t flags, double stamp_s,
                              double dequeued_s) {
     Stamp result;
@@ -75,8 +73,8 @@ class V4l2Stamps {
   std::int64_t buffers_ = 0;
   std::uint32_t last_ = 0;
   std::int64_t unwrapped_ = 0;
-  bool counts_ = false;  // a number has once followed another one
-  int repeats_ = 0;      // of a number
+  bool counts_ = false;  // the number has changed once
+  int repeats_ = 0;      // of the same number
 };
 
 }  // namespace alidade

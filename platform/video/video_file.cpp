@@ -46,7 +46,8 @@ bool VideoFile::open() {
   return true;
 }
 
-// One more packet for the decoder; at the end of the file, or where it breaks off, that no more will come.
+// Feeds the decoder one more packet, or the end of the stream at the end of the file or where it is
+// cut off.
 void VideoFile::feed() {
   const PacketPtr packet(av_packet_alloc());
   if (!file_.read(packet.get())) {

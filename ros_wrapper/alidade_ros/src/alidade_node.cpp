@@ -1,4 +1,4 @@
-// The node: an EdgeBridge in a process of its own.
+// The node: an EdgeBridge in its own process.
 
 #include <ros/ros.h>
 
@@ -14,7 +14,7 @@ int main(int argc, char** argv) {
   try {
     const alidade_ros::EdgeBridge bridge(handle, private_handle,
                                          alidade_ros::read_options(private_handle));
-    ros::AsyncSpinner spinner(2);  // a service that waits for the edge does not hold up another
+    ros::AsyncSpinner spinner(2);  // a service that waits for the edge must not block another
     spinner.start();
     ros::waitForShutdown();
   } catch (const std::invalid_argument& error) {

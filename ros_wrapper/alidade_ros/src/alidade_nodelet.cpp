@@ -11,7 +11,7 @@ namespace alidade_ros {
 
 class AlidadeNodelet : public nodelet::Nodelet {
  private:
-  // A wrong parameter throws: the manager says what it is and does not load the nodelet.
+  // A wrong parameter throws: the manager reports it and does not load the nodelet.
   void onInit() override {
     bridge_ = std::make_unique<EdgeBridge>(getMTNodeHandle(), getPrivateNodeHandle(),
                                            read_options(getPrivateNodeHandle()));

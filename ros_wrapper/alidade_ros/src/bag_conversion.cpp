@@ -37,7 +37,7 @@ double seconds(const ros::Time& time) {
   return static_cast<double>(time.sec) + 1e-9 * static_cast<double>(time.nsec);
 }
 
-// The wanted one of names, or the only one.
+// The name `wanted`, or else the only one of names.
 std::string choose(const std::string& wanted, const std::vector<std::string>& names,
                    const std::string& what, const std::string& option) {
   if (wanted.empty() && names.size() == 1) return names.front();
@@ -58,12 +58,12 @@ std::vector<std::string> topics_of(const rosbag::Bag& bag, const std::set<std::s
   return {topics.begin(), topics.end()};
 }
 
-// Joints appear with their first message.
+// Joint names are known from the first message.
 class Joints {
  public:
   explicit Joints(const BagOptions& options) : options_(options) {}
 
-  // None: the message is of other joints.
+  // nullopt: the message has other joints.
   std::optional<RecordedSample> sample(const sensor_msgs::JointState& message) {
     if (pan_.empty()) choose_joints(message.name);
     const auto pan = position(message, pan_);
@@ -135,7 +135,7 @@ Picture picture_of(const sensor_msgs::CompressedImage& image) {
   return {*type, image.data, decoded.cols, decoded.rows};
 }
 
-// What the header and the bag say of a message's times.
+// Times of a message, from its header and the bag.
 struct Times {
   double receive_time_s;
   std::optional<double> own_s;
@@ -153,7 +153,8 @@ Times times_of(const std_msgs::Header& header, const rosbag::MessageInstance& me
   return {seconds(header.stamp), std::nullopt};
 }
 
-// c of bag_conversion.h; rows without a clock of their own do not count.
+// The least receive time minus own time (docs/derivations.md); rows without an own time do not
+// count.
 template <typename Row>
 double own_clock_offset(const std::vector<Row>& rows, std::optional<double> Row::*own) {
   double least = std::numeric_limits<double>::infinity();
@@ -181,8 +182,8 @@ std::vector<std::uint8_t> luma_of(const sensor_msgs::Image& image) {
   struct Format {
     std::string encoding;
     int type;
-    int gray;     // code of cvtColor; -1: none
-    int channel;  // that is the luma, if gray is -1
+    int gray;     // code for cvtColor; -1: none
+    int channel;  // the channel with the luma, if gray is -1
   };
   static const std::vector<Format> kFormats = {{encodings::MONO8, CV_8UC1, -1, 0},
                                                {encodings::TYPE_8UC1, CV_8UC1, -1, 0},
@@ -205,7 +206,7 @@ std::vector<std::uint8_t> luma_of(const sensor_msgs::Image& image) {
     fail("an image's data do not fill its " + std::to_string(columns) + "x" + std::to_string(rows) +
          " pixels");
   }
-  // OpenCV takes no constant data, and leaves what it only reads as it is.
+  // OpenCV takes no constant data, but does not change what it only reads.
   const cv::Mat whole(rows, columns, format->type, const_cast<std::uint8_t*>(image.data.data()),
                       image.step);
   std::vector<std::uint8_t> bytes(static_cast<std::size_t>(rows) *
@@ -293,7 +294,7 @@ BagCounts recording_to_bag(const std::string& directory, const std::string& bag_
 
   if (std::filesystem::exists(bag_path)) fail(bag_path + " exists already; name another bag");
   rosbag::Bag bag(bag_path, rosbag::bagmode::Write);
-  // In the order of their times, as a reader of the bag will want them.
+  // In order of time, as readers of the bag expect it.
   const auto write_samples_before = [&](double receive_time_s) {
     for (; counts.samples < tables.samples.size(); ++counts.samples) {
       const RecordedSample& sample = tables.samples[counts.samples];

@@ -1,5 +1,5 @@
-// bag_tool: rosbags into recordings that `alidade calibrate` and `replay` read, and back.
-// Exit codes as the edge executable's: 0 ok, 1 failed, 2 bad usage; errors on stderr in one line.
+// bag_tool: converts rosbags to recordings for `alidade calibrate` and `replay`, and back. Exit
+// codes as of the edge executable: 0 ok, 1 failed, 2 bad usage; errors on stderr in one line.
 
 #include <CLI/CLI.hpp>
 #include <cstdio>

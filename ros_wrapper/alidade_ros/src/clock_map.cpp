@@ -5,7 +5,7 @@
 namespace alidade_ros {
 namespace {
 
-// A wall time in a double is rounded to a quarter of a microsecond.
+// A double rounds a wall time to a quarter of a microsecond.
 constexpr double kRoundingS = 1e-6;
 
 }  // namespace

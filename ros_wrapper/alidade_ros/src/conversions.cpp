@@ -20,7 +20,7 @@ std_msgs::Header header_of(const ros::Time& stamp, const std::string& frame) {
   return header;
 }
 
-// With the sign turned, and no -0.
+// With the sign changed, but never -0.
 double turned(double value) { return 0.0 - value; }
 
 tf2::Quaternion rotation(const std::array<double, 3>& axis, double angle) {
@@ -50,7 +50,7 @@ std::array<double, 3> base_from_ros(const geometry_msgs::Vector3& d_ros) {
 }
 
 geometry_msgs::Quaternion ros_orientation(const std::array<double, 4>& q_base_from_camera) {
-  // (1, 0, 0, 0), half a turn about x, times q is (w, -z, y, -x); of the two signs that with w >= 0.
+  // (1, 0, 0, 0), half a turn about x, times q is (w, -z, y, -x); of both signs take w >= 0.
   const auto& [x, y, z, w] = q_base_from_camera;
   const bool other = x > 0;
   geometry_msgs::Quaternion q;
@@ -170,7 +170,7 @@ sensor_msgs::CameraInfo camera_info(const Record& record, int width, int height,
 alidade_msgs::Calibration calibration(const CalibrationValues& values, const std::string& json,
                                       const ros::Time& stamp, const FrameNames& names) {
   const auto joint_axis = [](const std::array<double, 3>& axis) {
-    // In the base of ROS (a_x, -a_y, -a_z); the other way round, as joint positions count.
+    // In the base of ROS (a_x, -a_y, -a_z); reversed, as joint positions count the other way.
     geometry_msgs::Vector3 a;
     a.x = turned(axis[0]);
     a.y = axis[1];
@@ -254,7 +254,7 @@ std::vector<geometry_msgs::TransformStamped> transforms(const Record& record, co
     const double later = (row - record.reference_row) * record.line_delay_s;
     geometry_msgs::TransformStamped transform;
     transform.header = header_of(stamp + ros::Duration(later), names.base);
-    // Without a line delay all rows are one; tf2 complains of a stamp that it knows already.
+    // Without a line delay all rows have the same stamp; tf2 warns of a repeated stamp.
     if (!result.empty() && transform.header.stamp == result.back().header.stamp) continue;
     transform.child_frame_id = names.optical;
     transform.transform.rotation = ros_orientation(orientation_of_row(record, axes, row));

@@ -11,18 +11,18 @@
 namespace alidade_ros {
 namespace {
 
-constexpr std::uint32_t kQueue = 1000;  // records: 40 s at 25 Hz for a subscriber that hangs
+constexpr std::uint32_t kQueue = 1000;  // records: 40 s at 25 Hz for a stalled subscriber
 constexpr std::uint32_t kDetectionsQueue = 50;
 constexpr auto kPollPeriod = std::chrono::seconds(1);
 constexpr double kGreatestRosTimeS = 4294967295.0;
 const char* const kMasterMarker = "known_to_master";
 
-// What of the camera in the record changes with its calibration only.
+// The camera parameters in a record that change only with the calibration.
 bool same_calibration(const Record& a, const Record& b) {
   return a.calibrated == b.calibrated && a.aspect == b.aspect && a.line_delay_s == b.line_delay_s;
 }
 
-// With what changes from frame to frame where there is a zoom curve.
+// Also those that change from frame to frame if there is a zoom curve.
 bool same_camera(const Record& a, const Record& b) {
   return same_calibration(a, b) && a.focal_length_px == b.focal_length_px &&
          a.radial_distortion == b.radial_distortion && a.centre_offset_px == b.centre_offset_px;
@@ -32,7 +32,7 @@ bool same_lens(const sensor_msgs::CameraInfo& a, const sensor_msgs::CameraInfo& 
   return a.width == b.width && a.height == b.height && a.K == b.K && a.D == b.D;
 }
 
-// What is worth a message: counters and times alone are not.
+// Changes worth a message: counters and times alone are not.
 bool same_state(const alidade_msgs::Status& a, const alidade_msgs::Status& b) {
   return a.connected == b.connected && a.error == b.error && a.start == b.start &&
          a.mode == b.mode && a.status == b.status && a.calibrated == b.calibrated &&
@@ -72,12 +72,12 @@ EdgeBridge::~EdgeBridge() {
   changed_.notify_all();
   stream_.stop();
   poll_thread_.join();
-  ports_.reset();  // waits for service callbacks, which use what is destroyed before it otherwise
+  ports_.reset();  // waits for service callbacks, which use members that are destroyed earlier
 }
 
 void EdgeBridge::advertise() {
   const std::lock_guard<std::mutex> lock(ports_mutex_);
-  ports_.reset();  // taking down comes first: roscpp would share the old registration
+  ports_.reset();  // taken down first: roscpp would share the old registration
   ports_ = std::make_unique<Ports>(handle_, private_handle_);
   Ports& p = *ports_;
   p.frame_orientation =
@@ -108,7 +108,7 @@ void EdgeBridge::advertise() {
   private_handle_.setParam(kMasterMarker, true);
 }
 
-// A parameter of our own is gone with the master that held it. One that does not answer is none.
+// A parameter of this node is lost with the master that held it. No answer does not mean that.
 bool EdgeBridge::master_forgot_us() const {
   XmlRpc::XmlRpcValue request, response, known;
   request[0] = ros::this_node::getName();
@@ -121,7 +121,7 @@ void EdgeBridge::on_hello(const Hello& hello) {
   ROS_INFO("connected to %s, alidade %s", client_.address().url.c_str(), hello.version.c_str());
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    // Another run of the edge may be after a reboot, when the monotonic clock began anew.
+    // A new start may follow a reboot, at which the monotonic clock starts anew.
     if (hello.start != hello_.start) clock_.reset();
     clock_.add(hello.clock);
     hello_ = hello;
@@ -172,7 +172,7 @@ void EdgeBridge::on_record(const Record& record, std::uint64_t number) {
     }
     stamp = ros_time(seconds);
     camera_changed = !newest_ || !same_camera(*newest_, record);
-    // A lens alone is asked for with the next second's poll.
+    // A change of the lens alone waits for the next poll, within a second.
     calibration_changed = !newest_ || !same_calibration(*newest_, record);
     changed = calibration_changed || newest_->mode != record.mode ||
               newest_->status != record.status || newest_->calibration != record.calibration ||
@@ -306,7 +306,7 @@ void EdgeBridge::poll_calibration() {
   ros::Time stamp;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    // The answer may be newer or older than the newest record: then it is asked for again.
+    // The answer may be newer or older than the newest record; then it is requested again.
     calibration_is_old_ =
         none_yet ? newest_->calibrated
                  : newest_->calibrated && values.focal_length != newest_->focal_length_px;

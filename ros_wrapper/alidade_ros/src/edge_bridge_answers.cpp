@@ -1,4 +1,4 @@
-// What others ask the bridge: its health, and its services.
+// What the bridge answers: diagnostics and services.
 
 #include "alidade_ros/edge_bridge_ports.h"
 #include "alidade_ros/services.h"

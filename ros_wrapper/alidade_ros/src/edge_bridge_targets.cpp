@@ -1,4 +1,4 @@
-// Targets and their plane out, detections in.
+// Publishes targets and their plane; forwards detections.
 
 #include <utility>
 #include <vector>
@@ -69,8 +69,8 @@ void EdgeBridge::forward_detections(const alidade_msgs::Detections& detections) 
   }
 }
 
-// Who listens already keeps a static transform until its own end: tf2 has no word for that it is gone. Who comes later shall not be told of it: the
-// latched message is replaced by an empty one.
+// Nodes that run keep a static transform until they end, as tf2 cannot withdraw it. For nodes that
+// start later, the latched message is replaced by an empty one.
 void EdgeBridge::forget_plane_transform() {
   if (!plane_transform_) return;
   plane_transform_.reset();

@@ -67,7 +67,7 @@ void EventStream::take(const SseEvent& event) {
   } else if (event.type == "targets") {
     if (!handlers_.on_targets(event.data, &error)) return misunderstood(error);
   }
-  // `lost` tells what the numbers tell as well; others are of a newer edge.
+  // `lost` adds nothing to the numbers; other events come from a newer edge.
 }
 
 void EventStream::take_record(const SseEvent& event) {

@@ -13,7 +13,7 @@ namespace alidade_ros {
 namespace {
 
 constexpr std::size_t kMaxAnswerBytes = 16 << 20;
-constexpr double kRequestTimeoutS = 10;  // of silence
+constexpr double kRequestTimeoutS = 10;  // without data
 constexpr int kStopPollMs = 100;
 
 // CURL and CURLM are both void.
@@ -28,7 +28,7 @@ struct ListDeleter {
 };
 
 void initialise_curl() {
-  // Once for the process, whose other libraries may have done so.
+  // Once per process; its other libraries may have done so.
   static const CURLcode code = curl_global_init(CURL_GLOBAL_DEFAULT);
   (void)code;
 }
@@ -44,7 +44,7 @@ std::string token_of(const EdgeAddress& address, std::string* error) {
     if (!std::getline(file, token)) *error = "cannot read the token file " + address.token_file;
   }
   while (!token.empty() && (token.back() == '\r' || token.back() == '\n')) token.pop_back();
-  // A line feed in a header would begin another one.
+  // A line feed in a header would start another header.
   if (token.find_first_of("\r\n") != std::string::npos) *error = "the token has several lines";
   return token;
 }
@@ -73,7 +73,7 @@ std::string wrong_with(const EdgeAddress& address) {
   return "";
 }
 
-// One exchange, on a connection of its own.
+// One exchange, on its own connection.
 class HttpClient::Transfer {
  public:
   using Clock = std::chrono::steady_clock;
@@ -106,7 +106,7 @@ class HttpClient::Transfer {
 
   CURL* easy() { return easy_.get(); }
 
-  // False from on_bytes ends the transfer; so does silence for longer than silence_timeout_s.
+  // The transfer ends if on_bytes returns false, or after silence for silence_timeout_s.
   void run(double silence_timeout_s, std::function<bool(const char*, std::size_t)> on_bytes) {
     if (!error_.empty()) return;
     on_bytes_ = std::move(on_bytes);

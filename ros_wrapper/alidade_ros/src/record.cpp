@@ -7,7 +7,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-// Absent and null are the same: no value.
+// Absent and null are the same: nullopt.
 template <typename T>
 std::optional<T> optional_of(const Json& object, const char* name) {
   const auto found = object.find(name);
@@ -48,7 +48,7 @@ ZoomNodeValues zoom_node(const Json& json) {
   return node;
 }
 
-// A parameter of the calibration; null or absent: the default stays.
+// A parameter of the calibration; if null or absent, the default stays.
 template <typename T>
 void read_value(const Json& calibration, const char* name, T* value) {
   const auto found = calibration.find(name);
@@ -82,7 +82,7 @@ bool parse_record(const std::string& text, Record* record, std::string* error) {
     r.focal_length_sigma_px = optional_of<double>(json, "focal_length_sigma_px");
     r.aspect = json.at("aspect").get<double>();
     r.radial_distortion = json.at("radial_distortion").get<double>();
-    // An edge of before has none.
+    // Older edges do not send it.
     r.centre_offset_px = json.value("centre_offset_px", r.centre_offset_px);
     if (r.mode != "none") {
       Record::Orientation& o = r.orientation.emplace();

@@ -50,8 +50,8 @@ std::vector<std::string> cells_of(const std::string& line) {
   return cells;
 }
 
-// The named columns of a CSV file of numbers, row by row: required ones, then optional ones, which are NaN
-// where the cell is empty or the column missing.
+// Reads named columns of a CSV file of numbers, row by row: the required ones, then the optional
+// ones. These are NaN if the cell is empty or the column is missing.
 std::vector<std::vector<double>> read_table(const std::string& path,
                                             const std::vector<std::string>& required,
                                             const std::vector<std::string>& optional) {
@@ -72,7 +72,7 @@ std::vector<std::vector<double>> read_table(const std::string& path,
   std::vector<std::vector<double>> rows;
   for (int number = 2; std::getline(file, line); ++number) {
     const std::string where = path + ":" + std::to_string(number);
-    // The last line may have been cut off in the middle of a number.
+    // The last line may be cut off in the middle of a number.
     if (file.eof()) fail(where, "does not end with a line feed");
     const std::vector<std::string> cells = cells_of(line);
     if (cells.size() == 1 && cells[0].empty()) continue;
@@ -129,7 +129,7 @@ void write_file(const fs::path& path, const std::string& content) {
   write_file(path, content.data(), content.size());
 }
 
-// The JPEGs of a video, in order.
+// The JPEG pictures of a video, in order.
 class JpegVideo {
  public:
   explicit JpegVideo(const std::string& path) {

@@ -13,7 +13,7 @@ namespace {
 using visualization_msgs::Marker;
 
 constexpr double kChiSquare95 = 5.991;  // of two degrees of freedom
-constexpr double kThin = 0.002;         // shares of the distance
+constexpr double kThin = 0.002;         // fractions of the distance
 constexpr double kText = 0.03;
 
 geometry_msgs::Quaternion message(const tf2::Quaternion& q) {
@@ -42,7 +42,7 @@ tf2::Quaternion towards(double azimuth, double elevation) {
   return turned_about({0, 0, 1}, azimuth) * turned_about({0, 1, 0}, -elevation);
 }
 
-// By the golden ratio: neighbours in number differ.
+// Hue by the golden ratio: consecutive identities differ.
 std_msgs::ColorRGBA colour_of(std::uint64_t identity, double in_view) {
   const double hue = 6 * std::fmod(0.618034 * static_cast<double>(identity % 1000), 1.0);
   const auto part = [hue](double from) {
@@ -56,7 +56,8 @@ std_msgs::ColorRGBA colour_of(std::uint64_t identity, double in_view) {
   return colour;
 }
 
-// Diameters along the axes of the ellipse of 95 %, the first turned by `angle` from the first coordinate.
+// Diameters of the 95 % ellipse along its axes. The long axis is turned by `angle` from the first
+// coordinate.
 struct Ellipse {
   double long_axis = 0;
   double short_axis = 0;
@@ -72,13 +73,13 @@ Ellipse ellipse_of(double var_a, double cov, double var_b) {
   return {diameter(middle + half), diameter(middle - half), std::atan2(2 * cov, var_a - var_b) / 2};
 }
 
-// Where a target is, and how its markers stand there.
+// Position of a target and pose of its markers.
 struct Place {
   tf2::Vector3 foot, middle, after_a_second;
   tf2::Quaternion body, ellipse;
   geometry_msgs::Vector3 ellipse_scale;
-  double distance = 0;  // from the camera, m
-  double width = 0;     // of the box, m; 0: not known
+  double distance = 0;  // m, from the camera
+  double width = 0;     // m, of the box; 0: unknown
   double height = 0;
   bool is_known = false;
 };
@@ -113,7 +114,7 @@ Place as_direction(const alidade_msgs::Target& target, double distance) {
       at(target.azimuth + target.azimuth_rate, target.elevation + target.elevation_rate);
   const auto& c = target.covariance;
   const double across = std::cos(target.elevation);
-  // Across (to the left) and up, which are y and z there.
+  // Across (to the left) and up, which are y and z of place.body.
   const Ellipse ellipse = ellipse_of(c[0] * across * across, c[1] * across, c[5]);
   place.body = towards(target.azimuth, target.elevation);
   place.ellipse = place.body * turned_about({1, 0, 0}, ellipse.angle);
@@ -144,7 +145,7 @@ void add_markers(const alidade_msgs::Targets& targets, const alidade_msgs::Targe
     place.width = target.box.width / view.focal_length * place.distance;
     place.height = target.box.height / (view.focal_length * view.aspect) * place.distance;
   }
-  // A direction's place is the box's middle, a foot its lower edge.
+  // place.foot is the lower edge of the box on a plane, but the middle of the box for a direction.
   const tf2::Vector3 half_up(0, 0, place.height / 2);
   place.middle = plane ? place.foot + half_up : place.foot;
 

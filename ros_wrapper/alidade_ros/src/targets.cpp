@@ -21,7 +21,7 @@ double number_or_nan(const Json& object, const char* name) {
   return found == object.end() || found->is_null() ? kNan : found->get<double>();
 }
 
-// signs: of the state's components here over there.
+// signs: factors of the state's components from the edge's convention to this one.
 void read_covariance(const Json& rows, const std::array<double, 4>& signs,
                      alidade_msgs::Target* target) {
   target->covariance.fill(kNan);
@@ -152,7 +152,7 @@ std::size_t detections_left_out(const std::string& answer, std::string* why) {
     *why = left_out.at(0).at("reason").get<std::string>();
     return left_out.size();
   } catch (const Json::exception&) {
-    return 0;  // an edge that says nothing of it
+    return 0;  // an edge that does not report it
   }
 }
 

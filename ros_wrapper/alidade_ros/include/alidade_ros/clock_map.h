@@ -1,14 +1,13 @@
 #pragma once
 // ClockMap: CLOCK_MONOTONIC of the edge host to its wall clock, from pairs of readings.
 //
-// A pair says: when the monotonic clock showed m, the wall clock showed w, to within bracket/2 (the
+// A pair says: when the monotonic clock showed m, the wall clock showed w, within bracket/2 (the
 // wall clock was read between two readings of the other). Linux disciplines both clocks alike, so
-// w - m is constant but for steps (settimeofday, a leap second, the first fix of NTP). So the
-// difference is an interval, [w - m] +- bracket/2: pairs narrow it down, and one that excludes it is a
-// step. Each step begins a new stretch; a time is mapped by the stretch in which it lies, so that a
-// frame captured before the step keeps the stamp of its time. Between a step and the next pair times
-// are mapped by the old stretch.
-// Fixed memory: the last kStretches. Not thread-safe.
+// w - m is constant except for steps (settimeofday, a leap second, the first fix by NTP). The
+// difference is known as an interval, [w - m] +- bracket/2. Pairs narrow it; a pair that excludes
+// it shows a step and starts a new stretch. A time is mapped by the stretch that contains it, so a
+// frame captured before a step keeps its stamp. Times between a step and the next pair are mapped
+// by the old stretch. Fixed memory: the last kStretches. Not thread-safe.
 
 #include <cstddef>
 #include <deque>
@@ -19,28 +18,28 @@ namespace alidade_ros {
 struct ClockPair {
   double monotonic_s = 0;
   double wall_s = 0;     // Unix time
-  double bracket_s = 0;  // between the two readings around the wall clock's
+  double bracket_s = 0;  // between the two monotonic readings around the wall clock's
 };
 
 class ClockMap {
  public:
   static constexpr std::size_t kStretches = 16;
 
-  // stamp_offset_s: added to every wall time.
+  // stamp_offset_s is added to every wall time.
   explicit ClockMap(double stamp_offset_s = 0) : stamp_offset_s_(stamp_offset_s) {}
 
-  // Pairs come in the order of their monotonic times.
+  // Pairs must come in order of their monotonic times.
   void add(const ClockPair& pair);
 
-  // Forgets everything: another host, or the same after a reboot.
+  // Forgets everything: for another host, or after a reboot.
   void reset() { stretches_.clear(); }
 
-  // None before the first pair.
+  // nullopt before the first pair.
   [[nodiscard]] std::optional<double> wall_from_monotonic(double monotonic_s) const;
-  // Where a step back makes a wall time occur twice, the later one.
+  // If a step back makes a wall time occur twice, this is the later one.
   [[nodiscard]] std::optional<double> monotonic_from_wall(double stamp_s) const;
 
-  // Half the width of the newest interval, s.
+  // Half the width of the newest interval.
   [[nodiscard]] std::optional<double> uncertainty_s() const;
   [[nodiscard]] std::size_t steps() const { return steps_; }
 

@@ -1,13 +1,12 @@
 #pragma once
-// EdgeBridge: the node and the nodelet. A client of one edge executable's HTTP API that publishes what it
-// says, in ROS conventions, with capture times as stamps. Topics, services, parameters: README.md.
-//
-// Threads: the event stream's publishes records; a second one asks once a second for status and, when it
-// changed, the calibration, updates the diagnostics, and looks whether the master still knows this node.
-// roscpp registers with a master once: after the master's restart all topics and services are advertised
-// anew. Services and detections are called on the spinner's threads and wait for the edge at most ten seconds.
-// Lock order: ports_mutex_, then mutex_. Service callbacks never take ports_mutex_, since taking a service
-// down waits for them.
+// EdgeBridge: the node and the nodelet. A client of one edge executable's HTTP API that publishes
+// its data in ROS conventions, stamped with capture times. Topics, services, parameters: README.md.
+// Threads: the event stream's publishes records. A second one polls once a second: the status, the
+// calibration if it changed, diagnostics, and whether the master still knows this node. roscpp
+// registers with a master once, so after a restart of the master all topics and services are
+// advertised anew. Services and detections run on the spinner's threads and wait for the edge 10 s
+// at most. Lock order: ports_mutex_, then mutex_. Service callbacks never take ports_mutex_, as
+// taking a service down waits for them.
 
 #include <alidade_msgs/Calibrate.h>
 #include <alidade_msgs/Detections.h>
@@ -42,12 +41,13 @@ struct BridgeOptions {
   EdgeAddress edge;
   FrameNames names;
   bool publish_tf = true;
-  int tf_rows = 3;                // transforms a frame
+  int tf_rows = 3;                // transforms per frame
   double time_offset_s = 0;       // added to every stamp
-  double marker_distance_m = 10;  // at which targets that are directions are drawn
+  double marker_distance_m = 10;  // distance at which targets that are directions are drawn
 };
 
-// From a node's private parameters. Throws std::invalid_argument with one line that names the parameter.
+// Reads a node's private parameters. Throws std::invalid_argument with one line that names the
+// parameter.
 [[nodiscard]] BridgeOptions read_options(const ros::NodeHandle& private_handle);
 
 class EdgeBridge {
@@ -78,7 +78,7 @@ class EdgeBridge {
   void poll_status();
   void poll_calibration();
   void poll_plane();
-  void forget_plane_transform();  // under ports_mutex_
+  void forget_plane_transform();  // call with ports_mutex_ held
   void wake_poll();
 
   void diagnose_connection(diagnostic_updater::DiagnosticStatusWrapper& status);
@@ -109,7 +109,7 @@ class EdgeBridge {
   std::optional<geometry_msgs::TransformStamped> plane_transform_;
   TargetMarkers target_markers_;
 
-  mutable std::mutex mutex_;  // guards the next
+  mutable std::mutex mutex_;  // guards the members up to ending_
   ClockMap clock_;
   Hello hello_;
   bool connected_ = false;
@@ -123,14 +123,14 @@ class EdgeBridge {
   bool plane_is_old_ = true;
   std::uint64_t detections_taken_ = 0;
   std::uint64_t detections_refused_ = 0;
-  std::uint64_t boxes_left_out_ = 0;  // of detections that were taken
-  std::string detections_error_;      // of the last that were refused
+  std::uint64_t boxes_left_out_ = 0;  // in accepted detections
+  std::string detections_error_;      // of the last refused detections
   bool calibration_is_old_ = true;
   bool wake_ = false;
   bool ending_ = false;
   std::condition_variable changed_;
 
-  std::uint64_t diagnosed_records_ = 0;  // of the poll thread alone, as is the next
+  std::uint64_t diagnosed_records_ = 0;  // used by the poll thread only, as is the next
   ros::WallTime diagnosed_at_;
   std::thread poll_thread_;
 };

@@ -1,5 +1,5 @@
 #pragma once
-// What the bridge has at a master: all of it is made anew after the master's restart.
+// The bridge's registrations at a master; all are renewed after the master's restart.
 
 #include <diagnostic_updater/diagnostic_updater.h>
 #include <tf2_ros/static_transform_broadcaster.h>

@@ -1,9 +1,8 @@
 #pragma once
-// Requests to the edge executable's HTTP API, and its event stream, by libcurl.
-//
-// The bearer token is read anew for each connection, so that a renewed one is taken up, and goes nowhere
-// but into the Authorization header: no error, log or message holds it. Redirects are not followed. All
-// calls block the calling thread and end soon after stop().
+// Requests to the edge executable's HTTP API, and its event stream, by libcurl. The bearer token is
+// read for each connection, so that a renewed one is used. It goes only into the Authorization
+// header; no error, log or message contains it. Redirections are not followed. All calls block the
+// calling thread and end soon after stop().
 
 #include <condition_variable>
 #include <functional>
@@ -18,16 +17,16 @@ struct EdgeAddress {
   std::string token_env;                      // name of an environment variable; empty: none
   std::string token_file;                     // a file whose first line is the token; empty: none
   double connect_timeout_s = 5;
-  double silence_timeout_s = 15;  // of the stream, which says something each few seconds
+  double silence_timeout_s = 15;  // for the stream, which sends something every few seconds
 };
 
-// What is wrong with it in one line; empty: nothing.
+// One line on what is wrong with the address; empty: nothing.
 [[nodiscard]] std::string wrong_with(const EdgeAddress& address);
 
 class HttpClient {
  public:
   struct Answer {
-    long status = 0;  // 0: there was no answer
+    long status = 0;  // 0: no answer
     std::string body;
     std::string error;  // one line; empty: status is 2xx
     [[nodiscard]] bool ok() const { return error.empty(); }
@@ -42,14 +41,15 @@ class HttpClient {
   [[nodiscard]] Answer get(const std::string& path);
   [[nodiscard]] Answer post(const std::string& path, const std::string& json);
 
-  // Reads until the connection ends, which is always an error, or on_bytes returns false. Thread-safe.
+  // Reads until the connection ends, which is always an error, or on_bytes returns false.
+  // Thread-safe.
   [[nodiscard]] std::string stream(const std::string& path,
                                    const std::function<bool(const char*, std::size_t)>& on_bytes);
 
-  // Returns early after stop(). Thread-safe.
+  // Waits; returns early after stop(). Thread-safe.
   void wait(double seconds);
 
-  // Thread-safe, idempotent. All calls return soon, now and later.
+  // Thread-safe, idempotent. All calls, current and later, return soon.
   void stop();
   [[nodiscard]] bool stopped() const;
 

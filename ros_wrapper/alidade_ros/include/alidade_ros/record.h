@@ -1,10 +1,9 @@
 #pragma once
-// Record and friends: what the edge executable's HTTP API says, as structs in its own conventions.
-//
-// Base forward-right-down, camera right-down-forward, pan positive right, tilt positive up, the centre of
-// the top-left pixel at (0.5, 0.5); SI. The field names and their meaning are those of the API; a value
-// that is null there has none here. Pure: text in, value or one line of error out. Unknown fields are
-// ignored, so that an older node understands a newer edge.
+// Record and others: the content of the edge executable's HTTP API as structs, in its own
+// conventions: base forward-right-down, camera right-down-forward, pan positive right, tilt
+// positive up, centre of the top-left pixel (0.5, 0.5); SI units. Field names and meanings are
+// those of the API; null there is nullopt here. No side effects: text in, value or one line of
+// error out. Unknown fields are ignored, so that an older node understands a newer edge.
 
 #include <array>
 #include <cstdint>
@@ -33,9 +32,9 @@ struct Record {
   std::optional<double> time_sigma_s;
   double receive_time_s = 0;
   std::optional<double> latency_s;
-  std::optional<double> telemetry_age_s;  // how far it lies beyond the newest trusted angle
-  std::optional<double> zoom;             // reading
-  std::optional<double> zoom_rate_per_s;  // d log f / dt of a lens that is followed
+  std::optional<double> telemetry_age_s;  // how far the frame lies beyond the newest trusted angle
+  std::optional<double> zoom;             // device units
+  std::optional<double> zoom_rate_per_s;  // d log f / dt of a lens that is being followed
   std::optional<double> zoom_rate_sigma_per_s;
   std::string mode;  // OE, PT, none
   std::string status;
@@ -51,7 +50,7 @@ struct Record {
   std::optional<double> focal_length_sigma_px;
   double aspect = 1;
   double radial_distortion = 0;
-  std::array<double, 2> centre_offset_px{};  // of the optical centre from the image's middle
+  std::array<double, 2> centre_offset_px{};  // optical centre minus the image's middle
 };
 
 // The event `hello` of the stream.
@@ -66,7 +65,7 @@ struct ImageSize {
   int height = 0;  // px
 };
 
-// Of a parameter without a sigma: 0, exact.
+// A sigma of 0: the parameter has none and is exact.
 struct ZoomNodeValues {
   double reading = 0;
   double focal_length = 0;
@@ -77,7 +76,7 @@ struct ZoomNodeValues {
   std::array<double, 2> centre_offset_sigma{};
 };
 
-// What of a calibration is more than text to the node.
+// The part of a calibration that the node interprets.
 struct CalibrationValues {
   int width = 0;
   int height = 0;
@@ -95,15 +94,15 @@ struct CalibrationValues {
   std::vector<ZoomNodeValues> zoom_nodes;  // empty: there is no zoom curve
   std::optional<double> zoom_repeatability;
   std::vector<std::string> names;
-  std::vector<double> covariance;  // row-major over names; empty: not told
+  std::vector<double> covariance;  // row-major over names; empty: not given
 };
 
-// The ground under the camera, as GET /api/v1/plane has it.
+// The ground under the camera, from GET /api/v1/plane.
 struct PlaneValues {
   double heading = 0;  // rad, of the base's forward direction, clockwise from y
   double pitch = 0;    // rad, positive: forward is lifted
   double roll = 0;     // rad, positive: the right side is lowered
-  double x = 0;        // m, the camera's place over the plane
+  double x = 0;        // m, position of the camera over the plane
   double y = 0;
   double height = 0;
 };
@@ -112,7 +111,7 @@ struct PlaneValues {
 [[nodiscard]] bool parse_record(const std::string& json, Record* record, std::string* error);
 [[nodiscard]] bool parse_hello(const std::string& json, Hello* hello, std::string* error);
 [[nodiscard]] bool parse_clock_pair(const std::string& json, ClockPair* pair, std::string* error);
-// From the edge's status; none before its first frame.
+// From the edge's status; nullopt before its first frame.
 [[nodiscard]] bool parse_image_size(const std::string& json, std::optional<ImageSize>* size,
                                     std::string* error);
 [[nodiscard]] bool parse_calibration(const std::string& json, CalibrationValues* values,

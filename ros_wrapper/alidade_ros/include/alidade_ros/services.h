@@ -1,7 +1,6 @@
 #pragma once
-// The services' questions as JSON for the edge's API, and its answers as messages. Pure.
-//
-// Here pixels, directions and times change their convention (conversions.h); the edge does the rest.
+// Converts service requests to JSON for the edge's API, and its answers to responses: pixels,
+// directions and times change their conventions here (conversions.h). No side effects.
 
 #include <alidade_msgs/DirectionToPixel.h>
 #include <alidade_msgs/PixelToDirection.h>
@@ -18,7 +17,7 @@ namespace alidade_ros {
 [[nodiscard]] bool pixel_question(const alidade_msgs::DirectionToPixel::Request& request,
                                   const ClockMap& clock, std::string* json, std::string* error);
 
-// Fill all of the response but success and error.
+// Fill the response except success and error.
 [[nodiscard]] bool direction_answer(const std::string& json, const ClockMap& clock,
                                     alidade_msgs::PixelToDirection::Response* response,
                                     std::string* error);

@@ -1,10 +1,8 @@
 #pragma once
-// SseParser: Server-Sent Events out of a stream of bytes, as the HTML standard defines them.
-//
-// Lines end in LF, CR LF or CR, and may be cut anywhere between two calls. Several `data` lines of one
-// event are joined by line feeds; comments, unknown fields and events without data are left out. An
-// event that the stream's end cut off never comes out. Pure: bytes in, events out. Holds at most
-// kMaxEventBytes.
+// SseParser: extracts Server-Sent Events from a byte stream, as defined by the HTML standard. Lines
+// end in LF, CR LF or CR, and may be cut anywhere between two calls. Several `data` lines of an
+// event are joined by line feeds. Comments, unknown fields and events without data are skipped. An
+// event cut off by the end of the stream is never returned. No I/O. Holds at most kMaxEventBytes.
 
 #include <cstddef>
 #include <functional>
@@ -15,7 +13,7 @@ namespace alidade_ros {
 struct SseEvent {
   std::string type = "message";
   std::string data;
-  std::string id;  // of this event or the last one before that had one
+  std::string id;  // of this event, or of the last one that had an id
 };
 
 class SseParser {
@@ -24,7 +22,7 @@ class SseParser {
 
   explicit SseParser(std::function<void(const SseEvent&)> on_event);
 
-  // False: an event is larger than kMaxEventBytes; the connection is of no use any more.
+  // False: an event is larger than kMaxEventBytes; the connection must be closed.
   [[nodiscard]] bool feed(const char* bytes, std::size_t size);
 
  private:

@@ -1,9 +1,9 @@
 #pragma once
-// TargetMarkers: targets as RViz draws them, and what has to be taken away of those drawn before. Pure.
-//
-// On the plane, in its frame: the ellipse in which the place is with 95 % as a flat sphere, an arrow to where the target is
-// in a second, a box as large as it looks, and its identity above. As directions, in the base's frame: the same, at a
-// distance that the user chooses. A target out of view is pale. Colours go by identity.
+// TargetMarkers: RViz markers of targets, including the removal of earlier ones. No side effects.
+// On the plane, in its frame: the 95 % ellipse of the position as a flat sphere, an arrow to the
+// position in a second, a box of the apparent size, and the identity above. As directions, in the
+// base's frame: the same at a distance that the user chooses. A target out of view is pale. Colours
+// depend on the identity.
 
 #include <alidade_msgs/Targets.h>
 #include <visualization_msgs/MarkerArray.h>
@@ -15,22 +15,22 @@
 
 namespace alidade_ros {
 
-// How large a pixel is at a target; without it boxes are not drawn.
+// Gives the size of a pixel at a target; without a camera position no boxes are drawn.
 struct MarkerView {
   double focal_length = 0;      // px
-  double aspect = 1;            // of the vertical focal length over it
+  double aspect = 1;            // vertical focal length / focal_length
   double camera_position[3]{};  // m, in the plane's frame
   bool has_camera_position = false;
 };
 
 class TargetMarkers {
  public:
-  // direction_distance: at which directions are drawn, m, positive.
+  // direction_distance: m, positive; where directions are drawn.
   explicit TargetMarkers(double direction_distance) : distance_(direction_distance) {}
 
   [[nodiscard]] visualization_msgs::MarkerArray take(const alidade_msgs::Targets& targets,
                                                      const MarkerView& view);
-  // Takes all away.
+  // Removes all markers.
   [[nodiscard]] visualization_msgs::MarkerArray clear();
 
  private:

@@ -1,8 +1,8 @@
 #pragma once
-// What is tracked as messages, and a detector's messages as questions to the edge's API. Pure.
-//
-// Here pixels, angles and times change their convention (conversions.h). Azimuth, positive to the right there and to the
-// left here, changes its sign, and with it the rows and columns of its covariance.
+// Converts tracked targets to messages, and a detector's messages to requests for the edge's API:
+// pixels, angles and times change their conventions here (conversions.h). Azimuth is positive to
+// the right there and to the left here, so it and the rows and columns of its covariance change
+// sign. No side effects.
 
 #include <alidade_msgs/Detections.h>
 #include <alidade_msgs/Targets.h>
@@ -15,16 +15,16 @@
 
 namespace alidade_ros {
 
-// The event `targets` of the stream. False: *error is one line.
+// Parses the event `targets` of the stream. False: *error is one line.
 [[nodiscard]] bool parse_targets(const std::string& json, const ClockMap& clock,
                                  const FrameNames& names, alidade_msgs::Targets* targets,
                                  std::string* error);
 
-// False: *error is one line; the clock has no pair yet. What else is wrong with them, the edge says.
+// False: *error is one line; the clock has no pair yet. The edge reports other errors in them.
 [[nodiscard]] bool detections_question(const alidade_msgs::Detections& detections,
                                        const ClockMap& clock, std::string* json,
                                        std::string* error);
-// How many boxes the edge has left out, by its answer, and why the first.
+// Number of boxes that the edge left out, from its answer; *why is the reason for the first.
 [[nodiscard]] std::size_t detections_left_out(const std::string& answer, std::string* why);
 
 }  // namespace alidade_ros
