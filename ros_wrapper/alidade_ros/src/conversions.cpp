@@ -8,6 +8,8 @@
 #include <cmath>
 #include <limits>
 
+#include "record_conversion.h"
+
 namespace alidade_ros {
 namespace {
 
@@ -19,9 +21,6 @@ std_msgs::Header header_of(const ros::Time& stamp, const std::string& frame) {
   header.frame_id = frame;
   return header;
 }
-
-// With the sign changed, but never -0.
-double turned(double value) { return 0.0 - value; }
 
 tf2::Quaternion rotation(const std::array<double, 3>& axis, double angle) {
   return tf2::Quaternion(tf2::Vector3(axis[0], axis[1], axis[2]), angle);
@@ -84,50 +83,7 @@ alidade_msgs::FrameOrientation frame_orientation(const Record& record, std::uint
   message.header = header_of(stamp, names.base);
   message.child_frame_id = names.optical;
   message.record = number;
-  message.has_frame = record.frame.has_value();
-  message.frame = record.frame.value_or(-1);
-  message.time = record.time_s.value_or(kNan);
-  message.time_sigma = record.time_sigma_s.value_or(kNan);
-  message.receive_time = record.receive_time_s;
-  message.latency = record.latency_s.value_or(kNan);
-  message.mode = mode_number(record.mode);
-  message.status = record.status;
-  message.calibrated = record.calibrated;
-  message.calibration = record.calibration;
-  message.needs = record.needs;
-  message.reference_row = record.reference_row;
-  message.landmarks = static_cast<std::uint32_t>(record.landmarks);
-  message.residual = record.residual_px.value_or(kNan);
-  message.line_delay = record.line_delay_s;
-  message.focal_length = record.focal_length_px;
-  message.focal_length_sigma = record.focal_length_sigma_px.value_or(kNan);
-  message.zoom = record.zoom.value_or(kNan);
-  message.zoom_rate = record.zoom_rate_per_s.value_or(kNan);
-  message.zoom_rate_sigma = record.zoom_rate_sigma_per_s.value_or(kNan);
-  message.centre_offset_u = record.centre_offset_px[0];
-  message.centre_offset_v = record.centre_offset_px[1];
-  message.aspect = record.aspect;
-  message.radial_distortion = record.radial_distortion;
-  if (record.orientation) {
-    const Record::Orientation& o = *record.orientation;
-    message.orientation = ros_orientation(o.q_base_from_camera);
-    for (std::size_t i = 0; i < o.covariance_rad2.size(); ++i) {
-      message.orientation_covariance[i] = o.covariance_rad2[i];
-    }
-    message.pan = turned(o.pan_rad);
-    message.tilt = turned(o.tilt_rad);
-    message.pan_rate = turned(o.pan_rate_rad_s);
-    message.tilt_rate = turned(o.tilt_rate_rad_s);
-    message.pan_acceleration = turned(o.pan_acceleration_rad_s2);
-    message.tilt_acceleration = turned(o.tilt_acceleration_rad_s2);
-  } else {
-    message.orientation.x = message.orientation.y = kNan;
-    message.orientation.z = message.orientation.w = kNan;
-    message.orientation_covariance.fill(kNan);
-    message.pan = message.tilt = kNan;
-    message.pan_rate = message.tilt_rate = kNan;
-    message.pan_acceleration = message.tilt_acceleration = kNan;
-  }
+  fill_fields(record, &message);
   return message;
 }
 

@@ -1,19 +1,9 @@
 #include "alidade_ros/record.h"
 
-#include <nlohmann/json.hpp>
+#include "record_conversion.h"
 
 namespace alidade_ros {
 namespace {
-
-using Json = nlohmann::json;
-
-// Absent and null are the same: nullopt.
-template <typename T>
-std::optional<T> optional_of(const Json& object, const char* name) {
-  const auto found = object.find(name);
-  if (found == object.end() || found->is_null()) return std::nullopt;
-  return found->get<T>();
-}
 
 template <typename Read>
 bool parse(const std::string& text, const char* what, std::string* error, const Read& read) {
@@ -58,45 +48,7 @@ void read_value(const Json& calibration, const char* name, T* value) {
 }  // namespace
 
 bool parse_record(const std::string& text, Record* record, std::string* error) {
-  return parse(text, "record", error, [&](const Json& json) {
-    Record r;
-    r.frame = optional_of<std::int64_t>(json, "frame");
-    r.time_s = optional_of<double>(json, "time_s");
-    r.time_sigma_s = optional_of<double>(json, "time_sigma_s");
-    r.receive_time_s = json.at("receive_time_s").get<double>();
-    r.latency_s = optional_of<double>(json, "latency_s");
-    r.telemetry_age_s = optional_of<double>(json, "telemetry_age_s");
-    r.zoom = optional_of<double>(json, "zoom");
-    r.zoom_rate_sigma_per_s = optional_of<double>(json, "zoom_rate_sigma_per_s");
-    r.zoom_rate_per_s = optional_of<double>(json, "zoom_rate_per_s");
-    r.mode = json.at("mode").get<std::string>();
-    r.status = json.at("status").get<std::string>();
-    r.calibrated = json.at("calibrated").get<bool>();
-    r.calibration = json.at("calibration").get<std::string>();
-    r.needs = optional_of<std::string>(json, "needs").value_or("");
-    r.reference_row = optional_of<double>(json, "reference_row").value_or(0);
-    r.landmarks = json.at("landmarks").get<int>();
-    r.residual_px = optional_of<double>(json, "residual_px");
-    r.line_delay_s = json.at("line_delay_s").get<double>();
-    r.focal_length_px = json.at("focal_length_px").get<double>();
-    r.focal_length_sigma_px = optional_of<double>(json, "focal_length_sigma_px");
-    r.aspect = json.at("aspect").get<double>();
-    r.radial_distortion = json.at("radial_distortion").get<double>();
-    // Older edges do not send it.
-    r.centre_offset_px = json.value("centre_offset_px", r.centre_offset_px);
-    if (r.mode != "none") {
-      Record::Orientation& o = r.orientation.emplace();
-      o.pan_rad = json.at("pan_rad").get<double>();
-      o.tilt_rad = json.at("tilt_rad").get<double>();
-      o.pan_rate_rad_s = json.at("pan_rate_rad_s").get<double>();
-      o.tilt_rate_rad_s = json.at("tilt_rate_rad_s").get<double>();
-      o.pan_acceleration_rad_s2 = json.at("pan_acceleration_rad_s2").get<double>();
-      o.tilt_acceleration_rad_s2 = json.at("tilt_acceleration_rad_s2").get<double>();
-      o.q_base_from_camera = json.at("q_base_from_camera").get<std::array<double, 4>>();
-      o.covariance_rad2 = json.at("orientation_covariance_rad2").get<std::array<double, 9>>();
-    }
-    *record = r;
-  });
+  return parse(text, "record", error, [&](const Json& json) { *record = record_of(json); });
 }
 
 bool parse_hello(const std::string& text, Hello* hello, std::string* error) {

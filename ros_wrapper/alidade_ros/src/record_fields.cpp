@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "alidade_ros/conversions.h"
-#include "record_parsing.h"
+#include "record_conversion.h"
 
 namespace alidade_ros {
 
@@ -48,7 +48,6 @@ Record record_of(const Json& json) {
   o.pan_acceleration_rad_s2 = json.at("pan_acceleration_rad_s2").get<double>();
   o.tilt_acceleration_rad_s2 = json.at("tilt_acceleration_rad_s2").get<double>();
   o.q_base_from_camera = json.at("q_base_from_camera").get<std::array<double, 4>>();
-  o.orientation_sigma_rad = json.at("orientation_sigma_rad").get<std::array<double, 3>>();
   o.orientation_covariance_rad2 =
       json.at("orientation_covariance_rad2").get<std::array<double, 9>>();
   return r;

@@ -23,7 +23,7 @@ TEST(Record, IsReadWhole) {
   EXPECT_EQ(record.needs, "");
   ASSERT_TRUE(record.orientation);
   EXPECT_EQ(record.orientation->tilt_acceleration_rad_s2, 0.6);
-  EXPECT_EQ(record.orientation->covariance_rad2[5], 6);
+  EXPECT_EQ(record.orientation->orientation_covariance_rad2[5], 6);
   EXPECT_EQ(record.residual_px, 0.08);
   EXPECT_EQ(record.telemetry_age_s, -0.01);
   EXPECT_EQ(record.time_sigma_s, 0.02);

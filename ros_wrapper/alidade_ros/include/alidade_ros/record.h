@@ -6,52 +6,14 @@
 // error out. Unknown fields are ignored, so that an older node understands a newer edge.
 
 #include <array>
-#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "alidade_ros/clock_map.h"
+#include "alidade_ros/record_fields.h"
 
 namespace alidade_ros {
-
-struct Record {
-  struct Orientation {
-    double pan_rad = 0;
-    double tilt_rad = 0;
-    double pan_rate_rad_s = 0;
-    double tilt_rate_rad_s = 0;
-    double pan_acceleration_rad_s2 = 0;
-    double tilt_acceleration_rad_s2 = 0;
-    std::array<double, 4> q_base_from_camera{0, 0, 0, 1};  // x, y, z, w
-    std::array<double, 9> covariance_rad2{};               // row-major, of xi in R * Exp(xi)
-  };
-
-  std::optional<std::int64_t> frame;
-  std::optional<double> time_s;
-  std::optional<double> time_sigma_s;
-  double receive_time_s = 0;
-  std::optional<double> latency_s;
-  std::optional<double> telemetry_age_s;  // how far the frame lies beyond the newest trusted angle
-  std::optional<double> zoom;             // device units
-  std::optional<double> zoom_rate_per_s;  // d log f / dt of a lens that is being followed
-  std::optional<double> zoom_rate_sigma_per_s;
-  std::string mode;  // OE, PT, none
-  std::string status;
-  bool calibrated = false;
-  std::string calibration;
-  std::string needs;  // empty: nothing
-  double reference_row = 0;
-  std::optional<Orientation> orientation;
-  int landmarks = 0;
-  std::optional<double> residual_px;
-  double line_delay_s = 0;
-  double focal_length_px = 0;
-  std::optional<double> focal_length_sigma_px;
-  double aspect = 1;
-  double radial_distortion = 0;
-  std::array<double, 2> centre_offset_px{};  // optical centre minus the image's middle
-};
 
 // The event `hello` of the stream.
 struct Hello {

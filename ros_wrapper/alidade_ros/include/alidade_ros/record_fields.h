@@ -12,15 +12,14 @@ namespace alidade_ros {
 
 struct Record {
   struct Orientation {
-    double pan_rad = 0;                                   // rad
-    double tilt_rad = 0;                                  // rad
-    double pan_rate_rad_s = 0;                            // rad/s
-    double tilt_rate_rad_s = 0;                           // rad/s
-    double pan_acceleration_rad_s2 = 0;                   // rad/s^2
-    double tilt_acceleration_rad_s2 = 0;                  // rad/s^2
-    std::array<double, 4> q_base_from_camera{};           // x, y, z, w
-    std::array<double, 3> orientation_sigma_rad{};        // rad
-    std::array<double, 9> orientation_covariance_rad2{};  // rad^2
+    double pan_rad = 0;                                    // rad
+    double tilt_rad = 0;                                   // rad
+    double pan_rate_rad_s = 0;                             // rad/s
+    double tilt_rate_rad_s = 0;                            // rad/s
+    double pan_acceleration_rad_s2 = 0;                    // rad/s^2
+    double tilt_acceleration_rad_s2 = 0;                   // rad/s^2
+    std::array<double, 4> q_base_from_camera{0, 0, 0, 1};  // x, y, z, w
+    std::array<double, 9> orientation_covariance_rad2{};   // rad^2
   };
   struct Localized {
     double age_s = 0;      // s
@@ -41,7 +40,7 @@ struct Record {
   double line_delay_s = 0;                      // s/row
   double focal_length_px = 0;                   // px
   std::optional<double> focal_length_sigma_px;  // px
-  double aspect = 0;
+  double aspect = 1;
   double radial_distortion = 0;
   std::array<double, 2> centre_offset_px{};     // px
   std::optional<double> latency_s;              // s
