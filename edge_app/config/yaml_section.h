@@ -2,8 +2,7 @@
 // One mapping of a YAML configuration, read strictly (core/calibration/strict_yaml.h).
 //
 // Each reader (text, number, ...) returns the value of a key and checks its type and range.
-// finish() then rejects every key that no reader asked for. Each failure throws ConfigError with
-// one line
+// finish() then rejects every key that no reader asked for. A failure throws ConfigError, one line:
 //     FILE:LINE: SECTION.KEY: what is wrong; what would be right
 // An absent key gives an empty optional. A key without a value is an error. A number is plain: its
 // unit belongs to the key's name. Quoted numbers, and words such as "yes" for a truth value, are
@@ -75,8 +74,7 @@ class YamlSection {
 };
 
 // Hands the top section of a YAML text to `read`, which may throw ConfigError. False with one line
-// in
-// *error if the text is not YAML or `read` threw. `name` names the file in errors.
+// in *error if the text is not YAML or `read` threw. `name` names the file in errors.
 [[nodiscard]] bool parse_yaml(const std::string& text, const std::string& name,
                               const std::function<void(YamlSection&)>& read, std::string* error);
 
