@@ -16,14 +16,14 @@
 namespace alidade {
 namespace {
 
-constexpr double kReferenceRow = 0;         // at which angles, rates and q hold
-constexpr std::size_t kLongestLine = 2048;  // bytes that most lines do not exceed
+constexpr double kReferenceRow = 0;         // angles, rates and q hold at this row
+constexpr std::size_t kLongestLine = 2048;  // bytes; most lines are not longer
 
 template <std::size_t kSize>
 using Columns = std::array<const char*, kSize>;
 constexpr Columns<4> kQ = {"q_x", "q_y", "q_z", "q_w"};
 constexpr Columns<2> kCentre = {"centre_offset_u_px", "centre_offset_v_px"};
-// "localized." in JSON, "localized_" in CSV.
+// Members of the object "localized" in JSON; in CSV columns with the prefix "localized_".
 constexpr Columns<2> kLocalized = {"age_s", "sigma_rad"};
 constexpr Columns<3> kSigma = {"orientation_sigma_rad_0", "orientation_sigma_rad_1",
                                "orientation_sigma_rad_2"};
@@ -34,11 +34,11 @@ constexpr Columns<9> kCovariance = {
     "orientation_covariance_rad2_6", "orientation_covariance_rad2_7",
     "orientation_covariance_rad2_8"};
 
-// All fields in their order, each to line.add(name, value) or line.add(name, columns, values).
+// Adds all fields in their order: line->add(name, value), or line->add(name, columns, values).
 template <class Line>
 void add_fields(const OrientationRecord& record, Line* line) {
   using Orientation = OrientationRecord::Orientation;
-  // A member of the orientation, if there is one.
+  // A member of the orientation; empty without an orientation.
   const auto of_orientation = [&record](auto member) {
     using Member = std::decay_t<decltype(std::declval<Orientation>().*member)>;
     return record.orientation ? std::optional<Member>((*record.orientation).*member) : std::nullopt;
@@ -91,7 +91,7 @@ void add_fields(const OrientationRecord& record, Line* line) {
   line->add("time_sigma_s", record.time_s ? std::optional(record.time_sigma_s) : std::nullopt);
 }
 
-// One line, in memory of its own; what has no value is said by the word that the kind of line has for that.
+// One line in memory of its own. nothing: how this kind of line writes a missing value.
 class Text {
  public:
   explicit Text(std::string_view nothing) : nothing_(nothing) { text_.reserve(kLongestLine); }
@@ -102,12 +102,12 @@ class Text {
   void put_value(std::int64_t value) {
     fmt::format_to(std::back_inserter(text_), FMT_COMPILE("{}"), value);
   }
-  // What is not finite has no value.
+  // A number that is not finite is written as a missing value.
   void put_value(double value) {
     if (!std::isfinite(value)) return put(nothing_);
     const std::size_t begin = text_.size();
     fmt::format_to(std::back_inserter(text_), FMT_COMPILE("{}"), value);
-    // A number that could be a whole one is still seen to be a measured one.
+    // A whole number gets ".0", so that the field is always a floating-point number.
     if (text_.find_first_of(".e", begin) == std::string::npos) put(".0");
   }
   template <class T>
@@ -116,7 +116,7 @@ class Text {
   }
 
  protected:
-  // Replaces the comma behind the last field.
+  // Replaces the comma after the last field.
   void end(std::string_view by) {
     text_.pop_back();
     put(by);
@@ -177,7 +177,7 @@ class JsonLine : public Text {
     put(name);
     put("\":");
   }
-  // Our own words have nothing in them that JSON would want changed.
+  // These texts are the program's own and need no escapes in JSON.
   void put_json(std::string_view word) {
     put('"');
     put(word);
