@@ -64,8 +64,7 @@ ordered_json zoom_curve_json(const ZoomCurve& curve) {
   const ZoomCurve::Content& content = curve.content();
   ordered_json nodes = ordered_json::array();
   for (int i = 0; i < content.nodes; ++i) {
-    if (content.is_between[static_cast<std::size_t>(i)])
-      continue;  // not a dwell; the samples show it
+    if (content.is_between[static_cast<std::size_t>(i)]) continue;  // the samples show it
     const ordered_json all = parameters_json(curve.node(i));
     ordered_json node{{"reading", content.reading[static_cast<std::size_t>(i)]}};
     for (const char* name : {"focal_length", "radial_distortion", "centre_offset"}) {

@@ -9,8 +9,8 @@ namespace alidade {
 struct ClockPair {
   double monotonic_s = 0;  // CLOCK_MONOTONIC
   double wall_s = 0;       // CLOCK_REALTIME, since 1970
-  double bracket_s =
-      std::numeric_limits<double>::infinity();  // s, the two were read within this time
+  // Both clocks were read within this time.
+  double bracket_s = std::numeric_limits<double>::infinity();
 };
 
 // The best of a few reads.

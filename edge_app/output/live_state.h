@@ -4,7 +4,7 @@
 // plots), and lines of JSON (for readers that follow).
 //
 // All readers share one ring of lines. No reader waits for another. A reader that is too slow loses
-// the oldest lines and gets their number. write() is for the output thread: it formats the record,
+// the oldest lines and learns how many. write() is for the output thread: it formats the record,
 // holds a lock for microseconds and never waits for a reader. Any thread may call all other
 // functions. Memory is bounded: about 3 kB for each kept record and 1.5 kB for each line.
 

@@ -25,7 +25,7 @@ extern const char* const kStatusPagePolicy;
 void add_status_page(HttpServer* server, ImageTap* tap);
 
 // {"frame", "width", "height", "scale", "landmarks": [{"u", "v", "du", "dv", "used"}],
-//  "points": [[u, v]]}, all in px of the frame. A pixel of the JPEG is scale x scale px of the frame.
+//  "points": [[u, v]]}, in px of the frame. A pixel of the JPEG is scale x scale px of the frame.
 [[nodiscard]] std::string overlay_json(const LiveImage& image);
 
 }  // namespace alidade
