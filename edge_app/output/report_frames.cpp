@@ -92,7 +92,7 @@ std::vector<std::string> unused_frames(const ReportPage& page) {
                                    : static_cast<std::size_t>(why->second);
   };
   for (const CalibrationFrame& frame : page.report().input.frames) {
-    // The exclusions report frames without a time stamp and frames that occur twice.
+    // Skip used frames. The exclusions report frames without a time stamp and repeated frames.
     if (!std::isfinite(frame.stamp_s) || !known.insert(frame.frame).second) continue;
     ++(observed.count(frame.frame) != 0 ? left_out : without_points[line_of(frame.frame)]);
   }

@@ -149,8 +149,8 @@ void landmarks(ReportPage& page) {
   for (const FrameResult& frame : page.result().frames) {
     const Vector3<double> axis = R_base_from_camera(mechanics, frame.angle).col(2);
     path.push_back({frame.time_s - page.start_s(), place(axis)});
-    reference =
-        path.back().point.x / kDegrees;  // keeps the azimuth continuous beyond +-180 degrees
+    // Keeps the azimuth continuous beyond +-180 degrees.
+    reference = path.back().point.x / kDegrees;
   }
   double low_x = path.front().point.x;
   double high_x = low_x;
