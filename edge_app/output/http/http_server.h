@@ -4,25 +4,7 @@
 // One request a connection; one thread for all connections, two for the handlers. Clients with a
 // token have places and a rate of their own, and handlers answer them first. Within both groups
 // addresses share equally (http_fairness.h). Every error is JSON, {"error": "one line"}. Threads
-// run at the normal scheduling policy, niced.
-//   places   if max_strangers or max_with_token are taken, the oldest connection of the address
-//            that holds most is answered 503
-//   head     complete within head_timeout_s and max_head_bytes, else 408, 431
-//   body     of a POST: states its length, at most the route's limit, and comes within
-//            body_timeout_s, else 411, 413, 400. The body of another request is not read
-//   answer   a client that takes nothing for write_timeout_s is dropped
-//   rate     an address's share of requests_per_s, and as many at once, else 429
-//   token    if one is set, routes that are not open need `Authorization: Bearer TOKEN`, else 401.
-//            Routes that change something need a token that may control, else 403. Tokens are never
-//            logged (http_tokens.h)
-//   TLS      if a certificate is set (http_tls.h): the handshake is part of the head's time, and is
-//            counted like a request before it begins
-//   method   a method that the path does not have is answered 405, with Allow
-//   sites    403 for a request whose Origin is not this server, or that the browser says is from
-//            another site; without token and TLS also for a Host name other than localhost and the
-//            configured host (DNS rebinding)
-//   streams  without a token a browser's request for a stream needs a ticket, else 403: a page of
-//            another site can make a browser send it, but cannot read a ticket (http_tickets.h)
+// run at the normal scheduling policy, niced. Limits and status codes: README.md of this folder.
 
 #include <memory>
 #include <string>
