@@ -1,6 +1,6 @@
 # cmake -DPAGE=status_page.html -DSOURCE=status_page_text.cpp -P embed_page.cmake
-# Writes the page into a C++ source, together with a Content-Security-Policy. The policy allows the page's style
-# and script by their SHA-256, and nothing from elsewhere.
+# Writes the page into a C++ source, together with a Content-Security-Policy. The policy allows the
+# page's style and script by their SHA-256, and nothing from elsewhere.
 cmake_minimum_required(VERSION 3.16)
 file(READ "${PAGE}" page)
 
