@@ -1,4 +1,5 @@
-// alidade: the program. Results go to stdout or files; the log and one-line errors to stderr.
+// The program `alidade`. Results go to stdout or to files. The log and the one-line errors go to
+// stderr.
 
 #include <signal.h>
 
@@ -12,7 +13,7 @@
 
 int main(int argc, char** argv) {
   try {
-    signal(SIGPIPE, SIG_IGN);  // a reader that goes away is an error of write(2)
+    signal(SIGPIPE, SIG_IGN);  // if the reader is gone, write(2) fails instead
     alidade::start_log();
     if (argc > 1 && std::strcmp(argv[1], alidade::kNetworkTrial) == 0)
       return alidade::run_network_trial(argc, argv);

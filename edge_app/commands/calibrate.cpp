@@ -1,6 +1,6 @@
-// `alidade calibrate`: from the tracks or the video, and the telemetry, of a recording to its calibration,
-// its landmarks and a report. A calibration that is not good enough is not written, so that it cannot replace one
-// that is.
+// `alidade calibrate`: makes calibration, landmarks and a report from a recording's telemetry and
+// tracks or video. A calibration that is not good enough is not written, so that it cannot replace
+// a good one.
 
 #include <fmt/chrono.h>
 #include <fmt/format.h>
@@ -30,7 +30,7 @@
 namespace alidade {
 namespace {
 
-// Leaves *prior as it is if text is empty.
+// Leaves *prior unchanged if `text` is empty.
 void set_prior(const char* option, const std::string& text, const char* unit,
                std::optional<CalibrationPrior>* prior) {
   if (text.empty()) return;
@@ -71,7 +71,7 @@ void set_priors(const CalibrateOptions& options, CalibrationOptions* calibration
   if (!calibration->validate(&error)) throw CommandError(kExitUsage, error);
 }
 
-// What the options say goes before what the file says.
+// A value given as an option takes precedence over the file's.
 void set_lens_prior(const CalibrateOptions& options, CalibrationJob* job) {
   if (options.prior.empty()) return;
   job->known = load_lens_prior(options.prior, job->input.width, job->input.height, &job->remarks);
@@ -101,7 +101,7 @@ std::vector<ZoomJob> load_jobs(const CalibrateOptions& options) {
   return jobs;
 }
 
-// The format of a recording's tracks.csv.
+// Text of a tracks.csv, as recordings have it.
 std::string tracks_text(const std::vector<CalibrationObservation>& observations) {
   std::string text = tracks_csv_columns() + "\n";
   for (const CalibrationObservation& seen : observations) {
@@ -115,7 +115,7 @@ int calibrate_one(const std::string& recording, const CalibrateOptions& options,
                   StopSignals* signals) {
   const CalibrationResult result = calibrate_job(recording, options.passes, &job, signals);
   for (const std::string& remark : job.remarks) spdlog::warn("{}: {}", recording, remark);
-  // Without a solution there is nothing to draw.
+  // Without a solution there is nothing to plot.
   if (result.frames.empty()) {
     for (const std::string& line : result.exclusions.describe()) {
       spdlog::warn("{}: left out: {}", recording, line);
@@ -139,7 +139,7 @@ int calibrate_one(const std::string& recording, const CalibrateOptions& options,
     directory.add("landmarks", "map.bin", [&](const std::string& path, std::string* error) {
       return save_map(path, {result.landmarks, map}, result.calibration, error);
     });
-    // Last: when it stands, all of its run does.
+    // Write this last: when it exists, all other files of the run do.
     directory.add("calibration", "calibration.yaml",
                   [&](const std::string& path, std::string* error) {
                     const CalibrationNotes notes{result.quality,

@@ -1,5 +1,6 @@
 #pragma once
-// `alidade calibrate`. Its options bear the names of the command line (command_line.cpp), checked there.
+// `alidade calibrate`. The command line (command_line.cpp) names the options as here and checks
+// them.
 
 #include <optional>
 #include <string>
@@ -8,14 +9,14 @@
 namespace alidade {
 
 struct CalibrateOptions {
-  std::vector<std::string> recordings;  // their directories
+  std::vector<std::string> recordings;  // directories
   std::string directory;                // empty: <recording>/alidade
-  // Device units within which two zoom readings are one; none: as their jitter shows.
+  // Device units; readings that differ by no more are one zoom. Empty: found from their jitter.
   std::optional<double> zoom_tolerance;
   bool json = false;
-  int passes = 2;     // of finding tracks in the video
+  int passes = 2;     // how often tracks are sought in the video
   std::string prior;  // a lens.yaml; empty: none
-  // VALUE or VALUE,SIGMA; "free"; empty: as the estimator has it.
+  // Priors: VALUE, or VALUE,SIGMA, or "free"; empty: the estimator's default.
   std::string focal_length;
   std::string aspect;
   std::string radial_distortion;
@@ -24,8 +25,8 @@ struct CalibrateOptions {
   std::optional<double> scale_sigma;
 };
 
-// The calibration from a recording, or, of several zoom readings, from all of them. Returns the exit code; throws
-// CommandError.
+// Calibrates from one recording, or from all of them together where the zoom differs. Returns the
+// exit code; throws CommandError.
 [[nodiscard]] int calibrate_recordings(const CalibrateOptions& options);
 
 }  // namespace alidade

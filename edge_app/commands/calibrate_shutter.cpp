@@ -1,5 +1,5 @@
-// `alidade calibrate-shutter`: from a video of a known pattern to line delay and lens. A lens that is not good enough is not
-// written, so that it cannot replace one that is.
+// `alidade calibrate-shutter`: finds line delay and lens from a video of a known pattern. A lens
+// that is not good enough is not written, so that it cannot replace a good one.
 
 #include "edge_app/commands/calibrate_shutter.h"
 
@@ -117,7 +117,7 @@ std::string json_of(const PatternCalibration& calibration, const PatternVideo& v
   return json.dump() + "\n";
 }
 
-// What a person easily has wrong about this kind of pattern.
+// The usual mistakes with this kind of pattern.
 std::string hint_for(PatternStatus status, const KnownPattern& pattern) {
   if (status != PatternStatus::kNoPattern) return "";
   switch (pattern.kind) {
@@ -172,7 +172,7 @@ int calibrate_shutter(const CalibrateShutterOptions& options) {
   };
   warn(video.remarks);
   if (!video.doubt.empty()) {
-    // Of an AprilGrid it says what would be right.
+    // For an AprilGrid the doubt itself says what would be right.
     const bool is_whole = pattern->kind == PatternKind::kAprilGrid;
     throw CommandError(kExitFailed,
                        video.name + ": " + video.doubt +

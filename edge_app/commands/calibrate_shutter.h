@@ -1,5 +1,6 @@
 #pragma once
-// `alidade calibrate-shutter`. Its options bear the names of the command line (command_line.cpp), checked there.
+// `alidade calibrate-shutter`. The command line (command_line.cpp) names the options as here and
+// checks them.
 
 #include <optional>
 #include <string>
@@ -8,11 +9,11 @@ namespace alidade {
 
 struct CalibrateShutterOptions {
   std::string video;                 // a recording's directory, or a video file
-  std::string config;                // in its place: of a live video
-  std::optional<double> duration_s;  // of a live video, at most
-  std::string pattern;               // as known_pattern.h names it
+  std::string config;                // in place of `video`: configuration of a live video
+  std::optional<double> duration_s;  // s, at most; for a live video
+  std::string pattern;               // named as in known_pattern.h
   std::string directory;  // empty: <recording>/alidade, or alidade beside the file; live: alidade
-  std::string paper;      // --print: draw the pattern for it, and nothing else
+  std::string paper;      // --print: only draw the pattern for this paper
   bool json = false;
 };
 

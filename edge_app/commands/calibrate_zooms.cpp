@@ -24,7 +24,7 @@
 namespace alidade {
 namespace {
 
-// What holds at one zoom only can be no prior of several.
+// A value that holds at one zoom only cannot be a prior for several.
 void refuse_priors_of_one_zoom(const CalibrateOptions& options, std::size_t stretches) {
   const auto refuse = [stretches](const char* option, const std::string& text) {
     if (text.empty()) return;
@@ -47,7 +47,8 @@ void require_readings(const std::vector<ZoomJob>& jobs) {
   }
 }
 
-// Of the focal length at readings between the first and the last, relative, after a movement: the median and the largest.
+// Median and largest relative sigma of the focal length at readings between the first and the last,
+// as it is after a movement of the zoom.
 std::pair<double, double> sigmas_between(const ZoomCurve& curve) {
   constexpr int kReadings = 41;
   std::vector<double> sigmas;
@@ -118,7 +119,7 @@ std::string zooms_json(const ZoomFit& fit, const std::vector<Calibration>& nodes
   return json.dump(-1, ' ', false, ordered_json::error_handler_t::replace) + "\n";
 }
 
-// Of the dwells.
+// The curve's nodes at dwells, without those between them.
 std::vector<Calibration> nodes_of(const ZoomCurve& curve) {
   std::vector<Calibration> nodes;
   for (int i = 0; i < curve.content().nodes; ++i) {
@@ -127,7 +128,8 @@ std::vector<Calibration> nodes_of(const ZoomCurve& curve) {
   return nodes;
 }
 
-// What the tracks show while the zoom moves; calibration_of: each job's place among the calibrations, where it has one.
+// What the tracks show while the zoom moves. calibration_of: each job's index in `calibrations`, if
+// it was calibrated.
 std::vector<MovementObservation> observe_movements(
     const std::vector<ZoomJob>& jobs, const std::vector<std::optional<std::size_t>>& calibration_of,
     const std::vector<Calibration>& calibrations, const ZoomCurve& curve) {
@@ -201,7 +203,8 @@ int calibrate_zooms(const CalibrateOptions& options, std::vector<ZoomJob> jobs,
   }
   for (const std::string& line : zoom_advice(fit.curve)) spdlog::warn("{}", line);
   const std::vector<Calibration> nodes = nodes_of(fit.curve);
-  // Who uses it has moved the zoom since.
+  // Take sigmas from the curve: whoever uses the file has moved the zoom since, and curve.at()
+  // includes that.
   Calibration first;
   if (!fit.curve.at(fit.curve.first_reading(), &first)) {
     throw CommandError(kExitFailed, "the zoom curve has no calibration at its first reading");

@@ -1,6 +1,7 @@
 #pragma once
-// `alidade calibrate` over several zoom readings: each stretch is calibrated with a free optical centre, and all together give
-// the camera's zoom curve (core/calibration/zoom_fit.h), with what the tracks show while the zoom moves from one to the next.
+// `alidade calibrate` over several zoom readings. Each dwell (a part of a recording at one zoom) is
+// calibrated with a free optical centre. All dwells together give the camera's zoom curve
+// (core/calibration/zoom_fit.h). Tracks from the movements between two dwells are used, too.
 
 #include <string>
 #include <vector>
@@ -12,12 +13,12 @@
 namespace alidade {
 
 struct ZoomJob {
-  std::string recording;  // its directory
+  std::string recording;  // directory
   CalibrationJob job;
 };
 
-// Writes calibration.yaml with the curve, and a report for each stretch. A stretch that cannot be calibrated is left out and
-// said. Returns the exit code; throws CommandError.
+// Writes calibration.yaml with the curve, and a report for each dwell. A dwell that cannot be
+// calibrated is left out with a warning. Returns the exit code; throws CommandError.
 [[nodiscard]] int calibrate_zooms(const CalibrateOptions& options, std::vector<ZoomJob> jobs,
                                   StopSignals* signals);
 

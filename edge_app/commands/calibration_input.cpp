@@ -23,7 +23,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Single points beyond the image are the calibration's business, many are another image's.
+// A few points outside the image are left to the calibration. Many mean an image of another size.
 void check_size(const std::string& directory, const RecordingInfo& info,
                 const std::vector<TrackPoint>& tracks) {
   constexpr double kMaxShare = 0.1;
@@ -53,7 +53,7 @@ std::vector<ZoomReading> zoom_readings(const std::vector<PanTiltSample>& telemet
   return readings;
 }
 
-// Where the first reading is not yet that of the rest.
+// Sets the zoom of each dwell to its median reading, as the first one may differ from the rest.
 void set_levels(const std::vector<ZoomReading>& readings, std::vector<ZoomStretch>* stretches) {
   for (ZoomStretch& stretch : *stretches) {
     std::vector<double> zooms;
@@ -71,7 +71,7 @@ struct Span {
   [[nodiscard]] bool holds(double time_s) const { return time_s >= begin_s && time_s <= end_s; }
 };
 
-// Tracks are those of the part's frames that lie in `tracks`.
+// Keeps the tracks of those frames that lie in `frames` and in `tracks`.
 Tables part_of(const Tables& all, const Span& frames, const Span& telemetry, const Span& tracks) {
   Tables part;
   std::unordered_set<std::int64_t> names;
@@ -96,7 +96,8 @@ Tables part_of(const Tables& all, const ZoomStretch& stretch) {
 
 void fill(Tables tables, CalibrationJob* job);
 
-// From one stretch to the next, as *to_job's; nothing without tracks of it, or pictures that may hold some.
+// Stores the movement from one dwell to the next in *to_job. Does nothing without tracks of it and
+// without a video in which they could be found.
 void add_movement(const Tables& all, const ZoomStretch& from, const ZoomStretch& to,
                   CalibrationJob job, CalibrationJob* to_job) {
   const Span all_of_it{from.begin_s, to.end_s};

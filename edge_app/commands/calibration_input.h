@@ -1,6 +1,6 @@
 #pragma once
-// From a recording's files to what calibrate() takes. Without tracks.csv its video must hold them. Stamps and counts: see
-// calibration_streams.h.
+// Reads a recording's files as input for calibrate(). Without tracks.csv the tracks must be found
+// in its video. Time stamps and frame counts: calibration_streams.h.
 
 #include <optional>
 #include <string>
@@ -17,23 +17,27 @@ namespace alidade {
 struct CalibrationJob {
   CalibrationInput input;
   CalibrationOptions options;
-  KnownCamera known;  // beside the options
+  KnownCamera known;  // priors from a lens.yaml, in addition to the options
   CalibrationValues guess;
-  bool tracks_from_video = false;  // input.observations are still to be found in the video
-  std::optional<UntrackedFrames>
-      untracked;                     // frames without one, where they were found in the video
-  std::optional<double> zoom;        // the reading that all of it has, device units
+  bool tracks_from_video = false;  // input.observations must still be found in the video
+  // Frames without an observation; set where tracks were found in the video.
+  std::optional<UntrackedFrames> untracked;
+  std::optional<double> zoom;        // device units, the one reading of all frames
   std::vector<std::string> remarks;  // about the recording, for the report
-  // Of the zoom, from the stretch of the job before to this one's, where there are tracks of it or pictures.
+  // The movement of the zoom from the dwell of the job before to this one. Set if there are tracks
+  // of it, or a video.
   std::optional<ZoomMovement> movement;
-  // The frames in whose pictures its tracks are still to be found; none if it has them, or takes too long.
+  // The frames in which the tracks of `movement` must still be found. Empty if it has tracks, or
+  // takes longer than kLongestMovement_s.
   CalibrationInput movement_pictures;
 };
 
-// The recording, or, if its zoom moves, each stretch in which the reading stands still for kLeastStretch_s, less
-// kZoomMargin_s at either end, as image and telemetry are not yet known to be of one clock. With what it says of its stamps
-// and scales in the options. zoom_tolerance: device units within which two readings are one; none:
-// as their jitter shows. Throws CommandError.
+// One job for the whole recording. If its zoom moves: one job for each dwell, a time of at least
+// kLeastStretch_s in which the reading stands still. Frames within kZoomMargin_s of either end of a
+// dwell are left out, as the offset between the clocks of image and telemetry is not known yet. The
+// options hold what the recording states of its time stamps and scales. zoom_tolerance: device
+// units; readings that differ by no more are one zoom; empty: found from their jitter. Throws
+// CommandError.
 inline constexpr double kLeastStretch_s = 6;
 inline constexpr double kZoomMargin_s = 1;
 [[nodiscard]] std::vector<CalibrationJob> load_calibration_jobs(

@@ -1,7 +1,8 @@
-// `alidade check`: is everything that `run` needs there, and does it do what `run` takes for granted? Reads the
-// configuration and the calibration, connects to video and pan/tilt at once, measures both for some seconds
-// (check_measurement.h), and looks for the last picture in the scene map (check_scene.h). What the samples show is found in check/; this file asks and prints. A report and advice go to
-// stdout, what is wrong to stderr.
+// `alidade check`: is everything there that `run` needs, and does it do what `run` assumes? Reads
+// the configuration and the calibration, measures video and pan/tilt at the same time for some
+// seconds (check_measurement.h), and looks for the last picture in the scene map (check_scene.h).
+// The folder check/ judges the samples; this file calls it and prints. Report and advice go to
+// stdout, problems to stderr.
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
@@ -36,7 +37,7 @@
 namespace alidade {
 namespace {
 
-// What turns an axis's sign, for this kind of device.
+// How to reverse the sign of an axis, for this kind of device.
 std::string reverse_advice(const PanTiltConfig& pan_tilt, bool is_pan) {
   const std::string axis = is_pan ? "pan" : "tilt";
   if (pan_tilt.type == PanTiltConfig::Type::kRecording) {
@@ -83,16 +84,17 @@ std::string zooms_of(const NamedCalibration& calibration) {
   const ZoomCurve& curve = calibration.zoom_curve;
   if (!calibration.calibration.zoom) return "";
   if (curve.empty()) return fmt::format("{}", *calibration.calibration.zoom);
-  // As far as ZoomCurve::at() goes beyond its nodes.
+  // ZoomCurve::at() extrapolates that far beyond its nodes.
   const double range = curve.last_reading() - curve.first_reading();
   return fmt::format("readings {:g} to {:g}, by the zoom curve of {}",
                      curve.first_reading() - range, curve.last_reading() + range, calibration.name);
 }
 
-// What `run` has at the zoom that was told last; as it began, where it has nothing there.
+// The calibration that `run` would use at the last reported zoom. The one that it starts with if it
+// has none for that zoom.
 struct CalibrationHere {
   NamedCalibration calibration;
-  std::string lens;  // in words; empty: no zoom is told, or nothing is known there
+  std::string lens;  // in words; empty: no zoom is reported, or there is no calibration for it
 };
 
 CalibrationHere calibration_here(const Measured& measured, const Config& config,
@@ -191,7 +193,7 @@ void add_connection(const Connection& connection, const char* what, Findings* fi
                           connection.name, counted(connection.losses, "time"), connection.loss));
 }
 
-// The report and what would help on stdout; what is wrong on stderr.
+// Prints the report and the advice on stdout.
 void print_report(const CheckReport& report, const VideoNeeds& video_needs) {
   const Measured& measured = report.measured;
   fmt::print("video          {}: {}\n", escaped(measured.video.name),
@@ -219,7 +221,7 @@ void print_report(const CheckReport& report, const VideoNeeds& video_needs) {
   }
 }
 
-// What is known before anything was measured.
+// Prints what is known before the measurement.
 void print_beginning(const std::string& configuration, const NamedCalibration& calibration) {
   const Camera<double>& camera = calibration.calibration.camera;
   fmt::print("configuration  {}: ok\n", escaped(configuration));
@@ -231,7 +233,7 @@ void print_beginning(const std::string& configuration, const NamedCalibration& c
   std::fflush(stdout);
 }
 
-// Before the minutes of measuring: what is wrong with it ends the command.
+// Runs before the measurement, so that a faulty lens prior ends the command at once.
 void check_lens_prior(const Config& config, const Camera<double>& camera) {
   if (config.calibration.prior.empty() || camera.width == 0) return;
   std::vector<std::string> remarks;
@@ -243,7 +245,7 @@ void check_lens_prior(const Config& config, const Camera<double>& camera) {
       estimate_text(1e6 * known.line_delay.prior.value, 1e6 * known.line_delay.prior.sigma, "us"));
 }
 
-// Empty: it takes the connection.
+// Empty: the broker accepts a connection.
 std::string broker_error(const MqttOptions& options) {
   const std::string error = MqttConnection::files_error(options);
   return error.empty() ? MqttConnection::try_once(options) : error;
@@ -255,7 +257,7 @@ int check_links(const CheckOptions& options) {
   const Config config = require_config(options.config);
   const StartingCalibration start =
       load_starting_calibration(config, options.config, CalibrationStore::Use::kLook);
-  // Where run calibrates it has been loaded already.
+  // Where `run` calibrates, load_starting_calibration() has loaded the prior already.
   if (!start.calibrating.calibration)
     check_lens_prior(config, start.calibration.calibration.camera);
   static_cast<void>(require_plane(config));

@@ -1,5 +1,5 @@
 #pragma once
-// `alidade check`. Its options bear the names of the command line (command_line.cpp), checked there.
+// `alidade check`. The command line (command_line.cpp) names the options as here and checks them.
 
 #include <string>
 
@@ -11,7 +11,7 @@ struct CheckOptions {
   bool json = false;
 };
 
-// What is configured, and what its links send. Returns the exit code; throws CommandError.
+// Checks the configuration and what its links send. Returns the exit code; throws CommandError.
 [[nodiscard]] int check_links(const CheckOptions& options);
 
 }  // namespace alidade

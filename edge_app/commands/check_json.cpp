@@ -162,7 +162,7 @@ std::string check_json(const CheckReport& report) {
         {{"severity", finding.severity == Severity::kProblem ? "problem" : "advice"},
          {"text", finding.text}});
   }
-  // A file's name may be no UTF-8.
+  // A file name need not be UTF-8.
   return json.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 

@@ -1,6 +1,6 @@
 #pragma once
-// What `alidade check` found, for programs: the numbers of its report and every finding as one line of JSON. Names bear
-// their units; what is not known is null. README.md lists the keys. Pure; allocates.
+// The report of `alidade check` as one line of JSON: its numbers and all findings. The unit is part
+// of each name; an unknown value is null. edge_app/check/README.md lists the keys. Pure; allocates.
 
 #include <optional>
 #include <string>
@@ -16,24 +16,24 @@
 namespace alidade {
 
 struct CheckReport {
-  std::string configuration;  // the file
+  std::string configuration;  // path
   const NamedCalibration& calibration;
   const Measured& measured;
   const VideoReport& video;
   const TelemetryReport& telemetry;
   RepeatReport repeats;
-  std::optional<MotionReport> motion;  // where there are pictures and samples
-  bool has_telemetry = true;           // by configuration
+  std::optional<MotionReport> motion;  // empty without images or samples
+  bool has_telemetry = true;           // according to the configuration
   SceneCheck scene;
   std::string broker;        // of MQTT; empty: none is configured
-  std::string broker_error;  // empty: it takes a connection
-  Findings findings;         // of all of them
+  std::string broker_error;  // empty: it accepts a connection
+  Findings findings;         // of all checks
 };
 
-// No finding is a problem.
+// True if no finding is a problem.
 [[nodiscard]] bool is_ok(const Findings& findings);
 
-// With its line feed.
+// Ends with a line feed.
 [[nodiscard]] std::string check_json(const CheckReport& report);
 
 }  // namespace alidade

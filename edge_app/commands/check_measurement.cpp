@@ -22,9 +22,11 @@
 namespace alidade {
 namespace {
 
-// Reads for duration_s from the first item on; the first may take wait_s, and as long as the source knows what it waits
-// for. Until there is one, an error ends it: that is what the person wants to know. Later losses are counted, and the source
-// connects again. *waits: there is no item yet, but the source waits; other_waits: that of the other link.
+// Reads for duration_s from the first item on. The first item may take wait_s, counted from the
+// last moment at which the source could say what it waits for. Before the first item an error ends
+// the reading: that is what the user wants to know. Later losses are counted, and the source
+// reconnects. *waits: set while there is no item yet and the source waits. other_waits: the same of
+// the other link.
 template <typename Item, typename Source, typename OnItem>
 Connection collect(Source& source, double wait_s, double duration_s, std::atomic<bool>* waits,
                    const std::atomic<bool>& other_waits, const OnItem& on_item) {
@@ -44,7 +46,7 @@ Connection collect(Source& source, double wait_s, double duration_s, std::atomic
       connection.waited = waiting;
       end_s = now_s + wait_s;
     }
-    // So that there is a time at which both were read.
+    // Go on until the other link delivers, so that there is a time in which both were read.
     if (any && other_waits) end_s = now_s + duration_s;
     Item item;
     const ReadStatus status = source.read(item, kReadTimeout_s);
@@ -54,7 +56,7 @@ Connection collect(Source& source, double wait_s, double duration_s, std::atomic
       break;
     }
     if (status == ReadStatus::kDisconnected) {
-      connection.losses += lost ? 0 : 1;  // what follows are attempts to connect again
+      connection.losses += lost ? 0 : 1;  // more of these are failed attempts to reconnect
       connection.loss = source.error();
       lost = true;
     }
@@ -70,7 +72,7 @@ Connection collect(Source& source, double wait_s, double duration_s, std::atomic
   return connection;
 }
 
-// Looks at images on a thread of its own.
+// Examines images on a thread of its own.
 class ImageThread {
  public:
   ImageThread() : thread_([this] { work(); }) {}
@@ -78,7 +80,7 @@ class ImageThread {
   ImageThread(const ImageThread&) = delete;
   ImageThread& operator=(const ImageThread&) = delete;
 
-  // Takes the place of one that waits.
+  // Replaces an image that still waits.
   void offer(const Frame& frame) {
     const std::lock_guard<std::mutex> lock(mutex_);
     restarted_ = restarted_ || frame.stamp.restarted;
@@ -86,7 +88,7 @@ class ImageThread {
     changed_.notify_one();
   }
 
-  // Waits until it is done with what it was offered; ImageCheck is then the caller's.
+  // Waits until the last offered image is examined. Then the caller may use the ImageCheck.
   const ImageCheck& finish() {
     {
       const std::lock_guard<std::mutex> lock(mutex_);
@@ -96,7 +98,7 @@ class ImageThread {
     if (thread_.joinable()) thread_.join();
     return check_;
   }
-  // After finish().
+  // Only after finish().
   [[nodiscard]] const std::optional<Frame>& last() const { return last_; }
 
  private:
@@ -122,11 +124,11 @@ class ImageThread {
   std::mutex mutex_;
   std::condition_variable changed_;
   std::optional<Frame> waiting_;  // guarded by mutex_
-  bool restarted_ = false;        // guarded by mutex_: since the image last taken
+  bool restarted_ = false;        // guarded by mutex_; a new connection since the last image taken
   bool over_ = false;             // guarded by mutex_
-  ImageCheck check_;              // the thread's until it is joined
-  std::optional<Frame> last_;     // so is this
-  std::thread thread_;            // last: it uses the others
+  ImageCheck check_;              // owned by thread_ until it is joined
+  std::optional<Frame> last_;     // likewise
+  std::thread thread_;            // declared last, as it uses the others
 };
 
 std::optional<LastPicture> last_picture(const std::optional<Frame>& frame,
@@ -194,7 +196,7 @@ Measured measure(const Config& config, double duration_s) {
         *pan_tilt, config.pan_tilt.timeout_s + kConnectSlack_s, duration_s, &pan_tilt_waits,
         video_waits, [&](const PanTiltSample& sample) {
           measured.samples.push_back(sample);
-          // A recording's times are of another clock.
+          // The times of a recording belong to another clock.
           const bool live = config.pan_tilt.type != PanTiltConfig::Type::kRecording;
           measured.delivered_s.push_back(live ? monotonic_now_s() : sample.latest_time_s);
         });

@@ -1,8 +1,8 @@
 #pragma once
-// What `alidade check` collects from both links for some seconds.
+// What `alidade check` collects from both links in some seconds.
 //
-// Threads: video and pan/tilt are read by one each; images are looked at by a third, which takes the latest when it is
-// done with the one before, so that looking never makes a source drop frames. Of the images the last one is kept.
+// Threads: one reads the video, one reads pan/tilt, and a third examines images. The third always
+// takes the latest image, so that it never makes a source drop frames. The last image is kept.
 
 #include <optional>
 #include <string>
@@ -16,25 +16,25 @@
 
 namespace alidade {
 
-// A stream may begin with a burst of pictures that a relay had kept.
+// A stream may begin with a burst of pictures that a relay has stored. Losses in that time are
+// counted separately.
 inline constexpr double kStart_s = 2;
 
-// What became of one connection.
 struct Connection {
-  std::string error;  // why nothing came, or no more; empty: none
+  std::string error;  // why nothing, or nothing more, came; empty: none
   int losses = 0;     // after the first item
-  std::string loss;   // the last one's words
-  // What the source waited for last, though the connection stood, before its first item; empty: nothing.
+  std::string loss;   // error text of the last loss
+  // What the connected source waited for last before its first item; empty: nothing.
   std::string waited;
-  std::vector<std::string> notes;  // what it found out of its device
+  std::vector<std::string> notes;  // what the source found out about its device
   std::string name;
 };
 
-// The last image that was looked at.
+// The last image that was examined.
 struct LastPicture {
   Frame frame;
-  std::optional<Vector2<double>>
-      shift_px_s;  // of its centre, since the one before; none: not known
+  // px/s, of the image's content at its centre, since the image before; empty: not known.
+  std::optional<Vector2<double>> shift_px_s;
 };
 
 struct Measured {
@@ -42,15 +42,16 @@ struct Measured {
   Connection pan_tilt;
   std::vector<CheckedFrame> frames;
   std::vector<PanTiltSample> samples;
-  std::vector<double> delivered_s;  // each of them
+  std::vector<double> delivered_s;  // of each sample: when the source delivered it
   FrameSourceCounters counters;
   FrameSourceCounters counters_at_start;  // after the first kStart_s
   ImageReport images;
   std::optional<LastPicture> last;
 };
 
-// Each stream (no telemetry, by configuration, is none) for duration_s from its first item on. A video that waits for a key frame is waited for, which is said on
-// stderr; pan/tilt is read meanwhile. Shows its progress on a terminal.
+// Reads each configured stream for duration_s from its first item on. While the video waits for a
+// key frame, measure() waits too and says so on stderr; pan/tilt is read meanwhile. Shows its
+// progress on a terminal.
 [[nodiscard]] Measured measure(const Config& config, double duration_s);
 
 }  // namespace alidade

@@ -12,14 +12,14 @@
 namespace alidade {
 namespace {
 
-// In the camera's frame, rad/s, by how the picture's middle moved since the one before: what shows there goes left as the camera turns
-// right. 0 where that is not known.
+// Camera frame, rad/s, from the shift of the picture's centre since the one before. The content
+// moves left while the camera turns right. 0 if the shift is not known.
 Vector3<double> angular_velocity_of(const LastPicture& last, double focal_length) {
   if (!last.shift_px_s) return Vector3<double>::Zero();
   return {last.shift_px_s->y() / focal_length, -last.shift_px_s->x() / focal_length, 0};
 }
 
-// Why a picture was not found, and what helps.
+// Why a picture was not found, and what would help.
 std::string why_not(const Localization& found) {
   switch (found.status) {
     case LocalizationStatus::kOk:
@@ -44,7 +44,7 @@ std::string why_not(const Localization& found) {
 SceneCheck check_scene(const Config& config, const NamedCalibration& calibration,
                        const Measured& measured) {
   SceneCheck scene;
-  // The configuration's reader has said that mode PT does not use it.
+  // config.cpp has warned that mode PT does not use the map.
   if (!config.realtime.landmarks) return scene;
   scene.file = config.scene_map.file;
   const Camera<double>& camera = calibration.calibration.camera;
@@ -66,10 +66,10 @@ SceneCheck check_scene(const Config& config, const NamedCalibration& calibration
 
   LocalizationHint hint;
   const std::optional<CurveRange> range = range_of(calibration.zoom_curve);
-  // With telemetry the lens may zoom.
+  // With telemetry the lens may have zoomed, so its focal length is not given.
   if (!has_telemetry(config) && !range)
     hint.focal_length = focal_length_of(calibration.calibration);
-  // How fast pixels move says it of a known lens only.
+  // Pixels per second give an angular velocity only if the focal length is known.
   if (has_telemetry(config) || !range) {
     hint.angular_velocity =
         angular_velocity_of(*measured.last, calibration.calibration.camera.focal_length);

@@ -1,6 +1,7 @@
 #pragma once
-// Whether `run` can use the scene map that is configured, and where the last picture looks by it, without telemetry: as well as a
-// picture of that moment is found, be the map's and the camera's base one or not.
+// Whether `run` can use the configured scene map, and where the last picture looks according to it.
+// Telemetry is not used, so the answer does not depend on whether the bases of map and camera
+// agree.
 
 #include <cstdint>
 #include <optional>
@@ -16,11 +17,11 @@ namespace alidade {
 
 struct SceneCheck {
   std::string file;  // empty: none is configured
-  std::string
-      error;  // why the map cannot be used; empty: it can, or was not tried, as no picture came
+  // Why the map cannot be used; empty: it can, or it was not tried as no picture came.
+  std::string error;
   std::int64_t keyframes = 0;
   std::int64_t landmarks = 0;
-  std::int64_t frame = 0;  // the picture's
+  std::int64_t frame = 0;  // of the picture
   std::optional<Localization> found;
   Mechanics<double> mechanics;
   Findings findings;
@@ -29,7 +30,7 @@ struct SceneCheck {
 [[nodiscard]] SceneCheck check_scene(const Config& config, const NamedCalibration& calibration,
                                      const Measured& measured);
 
-// Behind "scene map", the file: whether it can be used.
+// For the line "scene map": whether the map can be used.
 [[nodiscard]] std::string headline(const SceneCheck& scene);
 [[nodiscard]] ReportLines describe(const SceneCheck& scene);
 

@@ -29,7 +29,7 @@ Config require_config(const std::string& path) {
   if (!load_config(path, &config, &error)) throw CommandError(kExitUsage, error);
   for (const std::string& warning : config.warnings) spdlog::warn("{}", warning);
   if (is_recording(config)) {
-    // What is wrong with a recording its source says, or who needs the size.
+    // Errors are ignored here. The recording's source reports them, or whoever needs the size.
     RecordingInfo info;
     if (read_recording_info(config.video.directory, &info, &error)) {
       config.video.width = info.width;
@@ -73,7 +73,7 @@ NamedCalibration choose_calibration(const Config& config) {
   if (!file.empty() && !not_yet) {
     NamedCalibration chosen = require_calibration_file(file);
     const Camera<double>& camera = chosen.calibration.camera;
-    // A recording's frames say it themselves.
+    // The frames of a recording have their own size.
     if (!is_recording(config) && video.width > 0 &&
         (video.width != camera.width || video.height != camera.height)) {
       throw CommandError(
@@ -99,7 +99,7 @@ Calibration data_sheet_calibration(const CameraConfig& camera) {
   Calibration calibration;
   calibration.camera.focal_length = *camera.focal_length_px;
   if (camera.focal_length_range) {
-    // Anywhere between its ends.
+    // log f is uniform between the ends of the range.
     const double sigma =
         std::log(camera.focal_length_range->tele_px / camera.focal_length_range->wide_px) /
         std::sqrt(12.0) * *camera.focal_length_px;
@@ -109,8 +109,8 @@ Calibration data_sheet_calibration(const CameraConfig& camera) {
   calibration.camera.aspect = camera.aspect;
   calibration.camera.radial_distortion = camera.radial_distortion;
   calibration.line_delay = camera.upside_down ? -camera.line_delay_s : camera.line_delay_s;
-  // What is not measured is nominal: axes as well mounted as PTCEE takes them to be, and the
-  // difference between two network links.
+  // What is not measured is nominal. These sigmas allow for axes mounted as well as PTCEE assumes,
+  // and for the difference in delay between two network links.
   constexpr double kAxisSigma_rad = 0.05;
   constexpr double kClockOffsetSigma_s = 0.1;
   for (const Parameter axis :
@@ -152,7 +152,7 @@ OrientationStepOptions step_options(const RecordingNoise& noise,
   options.zoom_curve = calibration.zoom_curve;
   options.video_clock =
       clock(noise.image_stamp_sigma_s, noise.image_period_s, noise.image_period_sigma_s);
-  // The clock of RTP, the coarsest that a live video stream has.
+  // RTP's clock, the coarsest of all live video streams.
   options.video_clock.stamp_resolution_s = 1.0 / 90000;
   options.telemetry_clock = clock(noise.telemetry_stamp_sigma_s, noise.telemetry_period_s,
                                   noise.telemetry_period_sigma_s);
@@ -168,7 +168,8 @@ OrientationStepOptions step_options(const RecordingNoise& noise,
 
 namespace {
 
-// A picture of another size is said, not looked at: no camera can ask for more memory than the configured one.
+// A larger picture is reported and not decoded, so that a camera cannot make the program take more
+// memory than the configured size needs.
 std::int64_t most_pixels(const VideoConfig& config) {
   return config.width > 0 ? std::int64_t{config.width} * config.height : kMostLivePixels;
 }
@@ -223,7 +224,7 @@ std::unique_ptr<FrameSource> make_frame_source(const VideoConfig& config, bool d
 
 namespace {
 
-// What the options of all polled sources have in common.
+// The options that all polled sources share.
 template <class Options>
 Options polling_options(const PanTiltConfig& config) {
   Options options;
@@ -276,7 +277,7 @@ std::unique_ptr<PanTiltSource> make_head_source(const PanTiltConfig& config) {
   return std::make_unique<QuerySource>(make_protocol(config.head.protocol), options);
 }
 
-// There is none: its end is its beginning.
+// Stands for a missing source: the stream ends at once.
 class NoPanTilt : public PanTiltSource {
  public:
   ReadStatus read(PanTiltSample&, double) override { return ReadStatus::kEnd; }

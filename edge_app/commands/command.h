@@ -1,6 +1,6 @@
 #pragma once
-// What the sub-commands share: exit codes, the one-line failure, and the way from a configuration to
-// sources and to the options of a real-time step.
+// What the sub-commands share: exit codes, the failure of one line, and functions that make sources
+// and the options of a real-time step from a configuration.
 
 #include <memory>
 #include <optional>
@@ -25,52 +25,55 @@ struct CommandError : std::runtime_error {
   ExitCode exit_code;
 };
 
-// Loads it and logs its warnings; throws CommandError.
+// Loads the configuration and logs its warnings; throws CommandError.
 Config require_config(const std::string& path);
 
-// The video of a configuration of which the rest need not be there (ConfigScope::kVideo); throws CommandError.
+// Section `video` of a configuration that needs no other (ConfigScope::kVideo); throws
+// CommandError.
 VideoConfig require_video_config(const std::string& path);
 
-// A calibration with what a person calls it.
 struct NamedCalibration {
   Calibration calibration;
-  bool calibrated = false;  // false: the data sheet's values
-  std::string name;         // file, or "data sheet"
-  ZoomCurve zoom_curve;     // of the file; may be empty
+  bool calibrated = false;  // false: the values of the data sheet
+  std::string name;         // for messages: the file, or "data sheet"
+  ZoomCurve zoom_curve;     // from the file; may be empty
 };
 
 NamedCalibration require_calibration_file(const std::string& path);
 
-// The file's calibration; the data sheet's if there is no file, or not yet (calibration.auto).
+// The calibration of calibration.file. The data sheet's if no file is named, or if calibration.auto
+// is set and the file does not exist yet. Throws CommandError.
 NamedCalibration choose_calibration(const Config& config);
 
-// The ground plane that the configuration names; null if it names none.
+// The ground plane that the configuration names; null if it names none. Throws CommandError.
 std::shared_ptr<const PlaneEstimate> require_plane(const Config& config);
 
-// A camera known from its data sheet only: nominal axes, no offsets, and standard deviations that admit it.
+// A camera that is known only from its data sheet: nominal axes, no offsets, and standard
+// deviations that are large enough for that.
 Calibration data_sheet_calibration(const CameraConfig& camera);
 
-// With the noise the configuration states, or the noise.yaml of a recording.
+// With the noise that the configuration, or the noise.yaml of a recording, states.
 OrientationStepOptions step_options(const Config& config, const NamedCalibration& calibration);
 OrientationStepOptions step_options(const RecordingNoise& noise,
                                     const NamedCalibration& calibration);
 
-// decode: with images. copy_to: a file for the video stream; empty: none.
+// decode: frames have images. copy_to: the video stream is copied to this file; empty: none.
 std::unique_ptr<FrameSource> make_frame_source(const VideoConfig& config, bool decode,
                                                const std::string& copy_to = "");
 std::unique_ptr<PanTiltSource> make_pan_tilt_source(const PanTiltConfig& config);
 
-// What a live source may take to its first item, beyond its own timeout, s: logging in, and a first key frame; longer than it takes
-// a source to say that it waits.
+// s, how much longer than its own timeout a live source may take to its first item, for the login
+// and a first key frame. A source reports earlier than that what it waits for.
 inline constexpr double kConnectSlack_s = 4;
 
-// One line: the link stands, and brings nothing.
+// One line: the link is connected and nothing came.
 std::string nothing_came(const std::string& source, double wait_s);
 
 // Logs the frames that a live source received damaged or had to drop, if any.
 void log_source_losses(const FrameSource& source);
 
-// Recordings bear the stamps of their own clock, so that live and recorded streams cannot be mixed.
+// The time stamps of a recording belong to its own clock, so live and recorded streams cannot be
+// mixed.
 bool is_recording(const Config& config);
 
 bool is_terminal(int descriptor);

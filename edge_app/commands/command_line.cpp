@@ -30,8 +30,8 @@
 namespace alidade {
 namespace {
 
-// Validators: what is wrong with a value, nothing if it is right. Those of the library for numbers tell their limits to
-// the last of 300 digits.
+// Validators: return what is wrong with a value, or nothing. The library's own validators for
+// numbers print their limits with up to 300 digits.
 std::string is_duration(const std::string& text) {
   const std::optional<double> value = number_of(text);
   return value && *value > 0 ? "" : fmt::format("'{}' is not a number of seconds above 0", text);
@@ -310,7 +310,7 @@ std::vector<std::string> option_names(const CLI::App& app) {
   return names;
 }
 
-// map, build
+// The chosen sub-commands from the outermost to the innermost: "map", "build".
 std::vector<const CLI::App*> chosen_commands(const CLI::App& app) {
   std::vector<const CLI::App*> chosen;
   const CLI::App* above = &app;
@@ -322,8 +322,9 @@ std::vector<const CLI::App*> chosen_commands(const CLI::App& app) {
   }
 }
 
-// The first word that is no command, or no option of the one that was chosen. The library asks first whether all that is
-// required is there, and what was mistyped is not.
+// A message about the first word that is neither a command nor an option of the chosen command.
+// Empty if there is none. The library would complain first about a missing required option,
+// although the option was only mistyped.
 std::string unknown_word(const CLI::App& app, const std::vector<std::string>& words) {
   const std::vector<std::string> unknown = app.remaining(true);
   const std::vector<const CLI::App*> chosen = chosen_commands(app);
@@ -349,7 +350,7 @@ std::string unknown_word(const CLI::App& app, const std::vector<std::string>& wo
   return "";
 }
 
-// One line: what is wrong, and where to read what would be right.
+// One line: what is wrong, and which help to read.
 std::string usage_error(const CLI::App& app, const std::vector<std::string>& words,
                         const CLI::ParseError& error) {
   std::string what = unknown_word(app, words);
@@ -365,7 +366,7 @@ int run_command_line(int argc, char** argv) {
   CLI::App app("Turns a pan-tilt-zoom camera into a precise direction sensor", "alidade");
   app.set_version_flag("--version", std::string("alidade ") + ALIDADE_VERSION);
   app.require_subcommand(1);
-  app.fallthrough();  // --version after a sub-command too
+  app.fallthrough();  // allows --version after a sub-command
   int exit_code = kExitOk;
   add_run(app, &exit_code);
   add_record(app, &exit_code);

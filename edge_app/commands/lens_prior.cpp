@@ -14,7 +14,7 @@
 namespace alidade {
 namespace {
 
-// The same camera's picture scaled to this width.
+// The lens for the same image scaled to this size.
 LensEstimate scaled_lens(const LensEstimate& lens, int width, int height) {
   const double scale = static_cast<double>(width) / lens.width;
   LensVector factor = LensVector::Ones();
@@ -31,7 +31,7 @@ LensEstimate scaled_lens(const LensEstimate& lens, int width, int height) {
   return result;
 }
 
-// For variances that are to stand without their correlations.
+// The factor for variances that are used without their correlations.
 double variance_growth(const Matrix<double, 4, 4>& covariance) {
   return Eigen::SelfAdjointEigenSolver<Matrix<double, 4, 4>>(correlation_of(covariance),
                                                              Eigen::EigenvaluesOnly)

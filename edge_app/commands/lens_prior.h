@@ -1,8 +1,10 @@
 #pragma once
-// What a lens.yaml (`alidade calibrate-shutter`) says of the camera of a recording or a live video: priors for calibrate_knowing(). Of
-// images of another size but the same shape they are scaled: as many rows take as long together. The base camera has one k and
-// its centre in the middle (core/pattern/lens_camera.h). Priors are taken one by one, without their correlations: all variances
-// are multiplied by the largest eigenvalue of the correlation matrix, beyond which no combination of them is wronged.
+// Priors for calibrate_knowing() from a lens.yaml of `alidade calibrate-shutter`. For images of
+// another size but the same shape the values are scaled; the read-out time of the whole image stays
+// the same. The base camera has one k and its centre in the middle (core/pattern/lens_camera.h).
+// The priors are used without their correlations. Therefore all variances are multiplied by the
+// largest eigenvalue of the correlation matrix. With that, no linear combination of the values has
+// a smaller variance than before.
 
 #include <string>
 #include <vector>
@@ -11,8 +13,9 @@
 
 namespace alidade {
 
-// All values wanted. remarks: what to tell of it. Throws CommandError: a file that cannot be read or is none, images of another shape,
-// a lens that the base camera cannot stand for.
+// Returns all values with `wanted` set. remarks: gets lines about the file for the user. Throws
+// CommandError if the file cannot be read or is no lens.yaml, if the shape of the images differs,
+// or if the base camera cannot represent the lens.
 [[nodiscard]] KnownCamera load_lens_prior(const std::string& path, int width, int height,
                                           std::vector<std::string>* remarks);
 

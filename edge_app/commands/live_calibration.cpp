@@ -29,11 +29,13 @@ void set_lens_prior(const Config& config, SelfCalibrationOptions* options) {
   }
 }
 
-// What may then be done with it. Throws CommandError where it is another process's.
+// Locks the store if calibrations are made. Returns how the store may be used. Throws CommandError
+// if another process holds the lock.
 CalibrationStore::Use lock_store(const Config& config, CalibrationStore* store) {
   std::string why;
   if (!config.calibration.automatic) {
-    // Who makes no calibrations reads those of who does, and keeps nobody out.
+    // A process that does not calibrate only tests the lock, so it keeps nobody out. If a
+    // calibrating process holds the lock, this one changes no file.
     FileLock in_use;
     return in_use.take(config.calibration.file, &why) == FileLock::Result::kInUse
                ? CalibrationStore::Use::kLook
@@ -95,7 +97,7 @@ Calibrating begin_calibrating(const Config& config, const std::string& path,
   Camera<double>& camera = options.data_sheet.camera;
   camera.width = stored == nullptr ? width : stored->calibration.camera.width;
   camera.height = stored == nullptr ? height : stored->calibration.camera.height;
-  // Who only looks sees what size there is.
+  // kLook (`check`) needs no size: it measures the size that the camera sends.
   if (camera.width == 0 && use == CalibrationStore::Use::kKeep) {
     throw CommandError(
         kExitUsage, path +

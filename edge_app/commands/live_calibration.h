@@ -1,6 +1,7 @@
 #pragma once
-// The calibration that `alidade run` begins with and goes on to make: what is stored, else the data
-// sheet. The one owner of which that is.
+// The calibration with which `alidade run` begins, and the objects that go on to calibrate. It
+// begins with a stored calibration, otherwise with the data sheet. Only this file makes that
+// choice.
 
 #include <memory>
 #include <optional>
@@ -13,27 +14,27 @@
 
 namespace alidade {
 
-// What calibrates a camera while it runs; empty where nothing is to be calibrated.
+// Calibrates the camera while it runs; both are null if nothing is to be calibrated.
 struct Calibrating {
   std::unique_ptr<CalibrationStore> store;
   std::unique_ptr<SelfCalibration> calibration;
 };
 
-// What `run` begins with, and `check` looks at.
+// What `run` begins with and `check` examines.
 struct StartingCalibration {
   Calibrating calibrating;
   NamedCalibration calibration;
   MapState map;
 };
 
-// path: of the configuration, for errors. use: kLook touches no file. Throws CommandError where
-// there is nothing to begin with.
+// path: of the configuration, for errors. use: kLook changes no file. Throws CommandError if there
+// is nothing to begin with.
 [[nodiscard]] StartingCalibration load_starting_calibration(const Config& config,
                                                             const std::string& path,
                                                             CalibrationStore::Use use);
 
-// What `run` has at a zoom reading as soon as the camera is there; none: nothing yet. tolerance:
-// within which two readings are one.
+// The calibration that `run` has at once for a zoom reading; empty: none yet. tolerance: device
+// units; readings that differ by no more are one zoom.
 [[nodiscard]] std::optional<NamedCalibration> calibration_at(const StartingCalibration& start,
                                                              double zoom, double tolerance);
 

@@ -47,7 +47,7 @@ class LivePattern {
     threads_.emplace_back(&LivePattern::read, this);
   }
 
-  // Looks at the image at hand to its end.
+  // Finishes the search in the current image.
   void stop() {
     source_.stop();
     {
@@ -59,21 +59,21 @@ class LivePattern {
     threads_.clear();
   }
 
-  // Polls readable when all was shown, or nothing more will come.
+  // Becomes readable when everything was shown, or when no more frames will come.
   [[nodiscard]] int finished_fd() const { return finished_; }
-  // When the first frame came; none yet: empty.
+  // When the first frame came; empty: none yet.
   [[nodiscard]] std::optional<double> started_s() const {
     const double started_s = started_s_;
     return started_s < 0 ? std::nullopt : std::optional(started_s);
   }
   [[nodiscard]] int looked() const { return looked_; }
   [[nodiscard]] int found() const { return found_; }
-  // Why there is no connection; empty: nothing is known to be wrong.
+  // Why there is no connection; empty: no fault is known.
   [[nodiscard]] std::string reason() const { return watch_.now(monotonic_now_s()).reason; }
 
-  // After stop(): why nothing more could come; empty: it could.
+  // Only after stop(): why no more frames could come; empty: they could.
   [[nodiscard]] const std::string& error() const { return error_; }
-  // After stop(). Throws CommandError.
+  // Only after stop(). Throws CommandError.
   [[nodiscard]] PatternVideo finish() { return search_.finish(); }
 
  private:
@@ -99,13 +99,13 @@ class LivePattern {
                       "video.width and video.height to what the camera sends, or leave them out",
                       source_.name(), frame.width, frame.height, config_.width, config_.height));
     }
-    // No clock: arrivals of one moment.
+    // Frames that arrived at the same moment give no clock; keep the first.
     if (!(frame.stamp.receive_time_s > last_s_)) return;
     last_s_ = frame.stamp.receive_time_s;
     if (started_s_ < 0) started_s_ = monotonic_now_s();
     if (!search_.note(frame)) return;
     const std::lock_guard<std::mutex> lock(mutex_);
-    waiting_ = frame;  // takes the place of one that waits
+    waiting_ = frame;  // replaces one that still waits
     changed_.notify_all();
   }
 
@@ -131,7 +131,7 @@ class LivePattern {
     }
   }
 
-  // Says what is still to be shown, if that is another than before.
+  // Logs what is still to be shown, if that has changed.
   void advise() {
     const PatternProgress progress = progress_of(search_.found_so_far());
     if (is_enough(progress)) {
@@ -157,7 +157,9 @@ class LivePattern {
   }
 
   static constexpr double kAdvicePeriod_s = 2;
-  static constexpr double kAdviceShare = 9;  // times what it takes: most of the time is for looking
+  // Pause after an advice, in units of its duration, so that most of the time is left for the
+  // search.
+  static constexpr double kAdviceShare = 9;
   static constexpr std::size_t kLines = 2;
 
   FrameSource& source_;
@@ -170,16 +172,16 @@ class LivePattern {
   std::condition_variable changed_;
   std::optional<Frame> waiting_;                              // guarded by mutex_
   bool over_ = false;                                         // guarded by mutex_
-  double last_s_ = -std::numeric_limits<double>::infinity();  // reading thread's
-  std::string error_;                                         // reading thread's until it is joined
-  std::vector<std::string> said_;                             // looking thread's
+  double last_s_ = -std::numeric_limits<double>::infinity();  // only the reading thread
+  std::string error_;              // only the reading thread, until it is joined
+  std::vector<std::string> said_;  // only the searching thread
   std::atomic<double> started_s_{-1};
   std::atomic<int> looked_{0};
   std::atomic<int> found_{0};
   std::vector<std::thread> threads_;
 };
 
-// False: a signal came.
+// Returns false if a signal came.
 bool wait_while_filming(StopSignals* signals, const LivePattern& live, const FrameSource& source,
                         double first_wait_s, double duration_s) {
   constexpr double kPeriod_s = 1;

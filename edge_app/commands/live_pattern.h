@@ -1,10 +1,12 @@
 #pragma once
-// The pattern in a live video, for `alidade calibrate-shutter -c`: films until all was shown that a calibration needs
-// (core/pattern/pattern_progress.h), or for duration_s from the first image on, or up to SIGINT or SIGTERM, and says on stderr what
-// is still to be shown. A camera that is lost is waited for, as `record` does.
+// Finds the pattern in a live video, for `alidade calibrate-shutter -c`. Films until everything
+// that a calibration needs was shown (core/pattern/pattern_progress.h), for duration_s from the
+// first image on, or until SIGINT or SIGTERM. Says on stderr what is still to be shown. Waits for a
+// lost camera, as `record` does.
 //
-// Threads: one reads and stamps, one looks for the pattern in the latest image when it is done with the one before, so that looking
-// neither delays stamps nor makes a source drop frames. At most two images are kept.
+// Threads: one reads and stamps the frames, the other searches the latest image for the pattern. So
+// the search neither delays time stamps nor makes a source drop frames. At most two images are
+// kept.
 
 #include <string>
 
@@ -14,10 +16,11 @@
 
 namespace alidade {
 
-// Beyond it the calibration would take minutes, and memory by the gigabyte.
+// A longer film would take minutes and gigabytes of memory to calibrate.
 inline constexpr double kLongestFilm_s = 300;
 
-// config: live. Throws CommandError: no image came, images of another size than configured, a link that failed for good.
+// config: of a live video. Throws CommandError if no image came, an image has another size than the
+// configured one, or the link failed for good.
 [[nodiscard]] PatternVideo film_pattern(const VideoConfig& config, const KnownPattern& pattern,
                                         double duration_s);
 

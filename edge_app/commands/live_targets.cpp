@@ -18,7 +18,7 @@
 namespace alidade {
 namespace {
 
-// A pipe without a reader would wait for one: that is refused, too.
+// Does not block: a pipe without a reader is an error.
 FileDescriptor open_to_append(const std::string& path) {
   if (path.empty()) return FileDescriptor();
   FileDescriptor file(
@@ -38,7 +38,7 @@ std::shared_ptr<const PlaneEstimate> plane_of(const Config& config,
 
 constexpr std::size_t kMostNetworkBytes = std::size_t{1} << 30;
 
-// Of a file of one a line; throws CommandError.
+// Reads a file with one name a line; throws CommandError.
 std::vector<std::string> read_class_names(const std::string& path) {
   std::string text;
   std::string error;
@@ -79,7 +79,8 @@ std::unique_ptr<NetworkDetector> load_network(const std::optional<NetworkFiles>&
     throw CommandError(kExitUsage, "detectors.onnx: " + files->model + ": " + error);
   }
   std::unique_ptr<NetworkDetector> network;
-  // OpenCV's worker threads have the priority of the thread that first needs them: not that of the one that starts the real-time thread.
+  // OpenCV's worker threads inherit the priority of the thread that first needs them. So a thread
+  // of the lowest priority loads the network, not the one that starts the real-time thread.
   std::thread([&] {
     static_cast<void>(set_lowest_priority());
     network = NetworkDetector::load(model, options, &error);

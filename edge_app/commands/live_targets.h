@@ -1,6 +1,6 @@
 #pragma once
-// LiveTargets: what `run` has of targets: the feed that takes detections, the detectors built in, where there are, and where the targets go. None
-// without section tracking.
+// LiveTargets: target tracking in `run`. It holds the feed that takes detections, the built-in
+// detectors if any are configured, and the destinations of the targets. Needs section `tracking`.
 
 #include <memory>
 #include <optional>
@@ -13,23 +13,24 @@
 
 namespace alidade {
 
-// Null where none is configured. Throws CommandError where its files cannot be used.
+// Null if no network is configured. Throws CommandError if its files cannot be used.
 [[nodiscard]] std::unique_ptr<NetworkDetector> load_network(
     const std::optional<NetworkFiles>& files);
 
 class LiveTargets {
  public:
-  // config.tracking.targets is there. Throws CommandError where output.targets cannot be written, or detectors.onnx not be used.
+  // config.tracking.targets must be set. Throws CommandError if output.targets cannot be written or
+  // detectors.onnx cannot be used.
   LiveTargets(const Config& config, std::shared_ptr<const PlaneEstimate> plane);
 
   [[nodiscard]] TargetFeed& feed() { return feed_; }
   [[nodiscard]] TargetLines& lines() { return lines_; }
-  // Null: no detector is built in.
+  // Null: no built-in detector is configured.
   [[nodiscard]] DetectorTap* detector_tap() { return tap_ ? &*tap_ : nullptr; }
-  // Of the tap that is there.
+  // Only if detector_tap() is not null.
   [[nodiscard]] DetectorsReport detectors() const;
   void start();
-  // Before whom the lines wake is gone.
+  // Must be called before the objects are destroyed that new lines wake.
   void stop();
 
  private:
@@ -41,7 +42,7 @@ class LiveTargets {
   std::optional<DetectorTap> tap_;
 };
 
-// Null where nothing is tracked.
+// Null if nothing is tracked.
 [[nodiscard]] std::unique_ptr<LiveTargets> make_live_targets(
     const Config& config, const std::shared_ptr<const PlaneEstimate>& plane);
 

@@ -22,8 +22,8 @@ void add_localization(const Localization& found, const Mechanics<double>& mechan
   (*json)["orientation_sigma_rad"] = {std::sqrt(pose.covariance(0, 0)),
                                       std::sqrt(pose.covariance(1, 1)),
                                       std::sqrt(pose.covariance(2, 2))};
-  // The angles, and the focal length, are those of this row's moment; what the camera did meanwhile
-  // is from the first row to the last.
+  // Angles and focal length are those at the exposure of this row. The changes below are from the
+  // first row to the last.
   const PictureMotion motion = in_heights(pose.motion, pose.camera.height);
   (*json)["reference_row"] = motion.reference_row;
   (*json)["read_out_turn_rad"] = {motion.angular_velocity.x(), motion.angular_velocity.y(),

@@ -1,5 +1,6 @@
 #pragma once
-// Where a picture looks by a scene map, as commands print it: keys into a JSON object, angles in the map's base. Pure; allocates.
+// A localization by a scene map as JSON, as commands print it. Angles are in the map's base. Pure;
+// allocates.
 
 #include <nlohmann/json_fwd.hpp>
 
@@ -8,9 +9,9 @@
 
 namespace alidade {
 
-// "status" and "matches"; with kOk, angles, orientation and lens when "reference_row" was exposed,
-// their standard deviations, and how much the camera turned (in its own frame) and log f changed
-// from the first row to the last, too.
+// Adds "status" and "matches". With kOk, also adds angles, orientation and lens at the time when
+// "reference_row" was exposed, their standard deviations, and what changed from the first row to
+// the last: the turn of the camera in its own frame (rad) and log f.
 void add_localization(const Localization& found, const Mechanics<double>& mechanics,
                       nlohmann::ordered_json* json);
 

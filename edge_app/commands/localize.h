@@ -1,6 +1,6 @@
 #pragma once
-// `alidade localize`: where pictures look, by a scene map, one line of JSON each. Its options bear the names of the command line
-// (command_line.cpp).
+// `alidade localize`: finds where pictures look by a scene map; one line of JSON for each. The
+// command line (command_line.cpp) names the options as here.
 
 #include <string>
 #include <vector>
@@ -9,11 +9,12 @@ namespace alidade {
 
 struct LocalizeCommand {
   std::string map;
-  std::vector<std::string> pictures;  // files, and directories of recordings
-  std::string
-      calibration;  // tells f by the zoom reading, clocks, axes; empty: telemetry gives the orientation alone
+  std::vector<std::string> pictures;  // files, or directories of recordings
+  // Gives f for a zoom reading, clock offset and axes; empty: telemetry has nominal axes and gives
+  // no focal length.
+  std::string calibration;
   bool no_telemetry = false;
-  int every = 1;  // frame of a recording
+  int every = 1;  // use each n-th frame of a recording
 };
 
 // Returns the exit code; throws CommandError.

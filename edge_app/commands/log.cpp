@@ -24,7 +24,7 @@ class EscapingFormatter final : public spdlog::formatter {
     spdlog::details::log_msg shown = message;
     shown.payload = text;
     line_->format(shown, to);
-    // Where the sink puts colours.
+    // Tells the sink where to put colours.
     message.color_range_start = shown.color_range_start;
     message.color_range_end = shown.color_range_end;
   }

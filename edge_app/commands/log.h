@@ -1,15 +1,16 @@
 #pragma once
-// The log on stderr, and the one line with which a command ends. What goes there may hold text of cameras, peers and files: it is shown
-// escaped (platform/system/escaped.h), each message on one line.
+// The log on stderr, and the error line with which a command ends. Messages may hold text from
+// cameras, peers and files. They are escaped (platform/system/escaped.h), so that each stays on one
+// line.
 
 #include <string>
 
 namespace alidade {
 
-// Before anything is logged.
+// Must be called before anything is logged.
 void start_log();
 
-// `alidade: TEXT`
+// Prints `alidade: TEXT` on stderr.
 void print_error(const std::string& text);
 
 }  // namespace alidade

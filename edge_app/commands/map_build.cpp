@@ -28,7 +28,7 @@ namespace fs = std::filesystem;
 
 struct Chosen {
   std::size_t recording;
-  std::size_t frame;  // place in its frames
+  std::size_t frame;  // index into the views of that recording
 };
 
 std::optional<NamedCalibration> calibration_of(const MapBuildCommand& options) {
@@ -52,14 +52,14 @@ void require_one_size(const std::vector<MapRecording>& recordings) {
 
 // How fast the pictures of a map may turn.
 struct Pace {
-  double readout_s = 0;    // of a picture
-  bool is_known = false;   // by a calibration: telemetry then tells where each row looks
-  std::size_t frames = 0;  // whose speed telemetry tells
-  std::size_t fast = 0;    // of them, too fast
-  double longest_f = 0;    // px, of all
+  double readout_s = 0;    // s, of a whole picture
+  bool is_known = false;   // a calibration is given; then telemetry gives each row's orientation
+  std::size_t frames = 0;  // frames whose speed telemetry gives
+  std::size_t fast = 0;    // of these, the ones that are too fast
+  double longest_f = 0;    // px, the longest focal length of them
   [[nodiscard]] double most_haste() const { return is_known ? kMostKnownHaste : 1; }
 
-  // In the words and the numbers of somebody who turns the camera.
+  // For the person who turns the camera.
   [[nodiscard]] std::string text() const {
     const double most_px = KeyframeChoiceOptions().most_motion_px * most_haste();
     std::string out = fmt::format("so slowly that a picture moves by at most {:g} px", most_px);
@@ -78,15 +78,16 @@ struct Pace {
   }
 
  private:
-  // Where each row's motion is known, blur is what is left.
+  // If the motion of each row is known, only blur limits the speed.
   static constexpr double kMostKnownHaste = 5;
 };
 
-// Where nothing tells the read-out.
+// The read-out time if nothing states it.
 constexpr double kGuessedReadout_s = 0.03;
 
-// By place where telemetry tells it, beside those that are there, else evenly over time. Slow ones
-// first; places that no slow one shows, by the slowest that do.
+// Chooses the frames that become keyframes, at most `most`. Frames with telemetry are chosen by
+// place, in addition to the keyframes of `there`; the others evenly over time. Slow frames come
+// first. A place that no slow frame shows is taken from the slowest frame that shows it.
 std::vector<Chosen> choose(const std::vector<MapRecording>& recordings,
                            const std::vector<std::vector<MapView>>& views, const SceneMap& there,
                            const MapBuildOptions& build, int most, Pace* pace) {
@@ -148,7 +149,7 @@ std::vector<Chosen> choose(const std::vector<MapRecording>& recordings,
   return out;
 }
 
-// The keyframes of a map that is there, with their pictures; none without one.
+// The existing map, with the pictures of its keyframes; empty without a path.
 SceneMap map_to_add(const std::string& path, const MapBuildOptions& build) {
   SceneMap map;
   if (path.empty()) return map;
@@ -164,7 +165,8 @@ SceneMap map_to_add(const std::string& path, const MapBuildOptions& build) {
   return map;
 }
 
-// Their features are found again: a map keeps what became landmarks.
+// Adds the keyframes of `map`. Their features are found anew, as a map stores only those that
+// became landmarks.
 void add_keyframes(const SceneMap& map, double angle_sigma, const FeatureDetector& detector,
                    MapBuilder* builder) {
   JpegDecoder decoder;
@@ -205,7 +207,7 @@ std::string names_of(const MapBuilder& builder, const std::vector<int>& pictures
   return out;
 }
 
-// What was left out as it moved, before a refusal that it may explain.
+// How many frames were left out as they moved too fast. It may explain a refusal.
 std::string fast_text(const Pace& pace) {
   return pace.fast == 0 ? ""
                         : fmt::format("; {} of {} frames moved too fast", pace.fast, pace.frames);
@@ -319,7 +321,7 @@ int build_map(const MapBuildCommand& options) {
     for (const Chosen& c : chosen) {
       if (c.recording != r) continue;
       const MapView& view = views[r][c.frame];
-      // Views of frames without a reading are not there: by number.
+      // Search by frame number, as frames without a zoom reading have no view.
       const auto at = std::find_if(recordings[r].frames.begin(), recordings[r].frames.end(),
                                    [&](const FrameStamp& s) { return s.frame == view.frame; });
       frames.push_back(static_cast<std::size_t>(at - recordings[r].frames.begin()));

@@ -1,5 +1,6 @@
 #pragma once
-// `alidade map build`: a scene map of recordings. Its options bear the names of the command line (command_line.cpp).
+// `alidade map build`: makes a scene map from recordings. The command line (command_line.cpp) names
+// the options as here.
 
 #include <string>
 #include <vector>
@@ -9,8 +10,8 @@ namespace alidade {
 struct MapBuildCommand {
   std::vector<std::string> recordings;
   std::string map;           // the file to write
-  std::string add;           // a map whose keyframes are taken over; empty: none
-  std::string calibration;   // empty: <first recording>/alidade/calibration.yaml, if it is there
+  std::string add;           // a map whose keyframes are added; empty: none
+  std::string calibration;   // empty: <first recording>/alidade/calibration.yaml, if it exists
   std::string focal_length;  // px, or WIDE:TELE
   int keyframes = 300;       // at most
   bool no_telemetry = false;

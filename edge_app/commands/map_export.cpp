@@ -40,7 +40,7 @@ std::string keyframes_csv(const SceneMap& map) {
     const Camera<double> camera = map.camera_of(k);
     const Vector2<double> centre = camera.optical_centre();
     std::string recording = k.recording;
-    // A cell of its own, whatever the folder's name.
+    // A folder's name must not split the cell.
     std::replace(recording.begin(), recording.end(), ',', '_');
     std::replace(recording.begin(), recording.end(), '\n', '_');
     std::vector<std::string> cells = {std::to_string(k.id),
@@ -62,11 +62,11 @@ std::string keyframes_csv(const SceneMap& map) {
   return out;
 }
 
-// Longitudes and latitudes about the base, to the right and down; where several keyframes see a place, that of the longest focal
-// length is shown.
+// An equirectangular picture in the base frame: pan to the right, elevation down. Of several
+// keyframes that see a place the one with the longest focal length is shown.
 struct Panorama {
-  double left = 0, top = 0;  // rad
-  double per_rad = 1;        // px
+  double left = 0, top = 0;  // rad; pan grows to the right, top is positive below the horizon
+  double per_rad = 1;        // px/rad
   int width = 0, height = 0;
   std::vector<std::uint8_t> luma;
 
@@ -77,7 +77,7 @@ struct Panorama {
   }
 };
 
-// Angles of a direction; pan about the middle's.
+// The angles of a direction; pan is within pi of `middle`, tilt is positive downwards.
 PanTilt<double> place_of(const Vector3<double>& d, double middle) {
   const double pan = std::atan2(d.y(), d.x());
   return {middle + wrap_angle(pan - middle), std::asin(std::clamp(d.z(), -1.0, 1.0))};
@@ -127,7 +127,7 @@ void draw(const SceneMap& map, const SceneKeyframe& k, const Picture& picture, P
   const Vector3<double> axis = R.col(2);
   const double reach = std::cos(std::min(
       1.5, 1.3 * std::atan(std::hypot(camera.width, camera.height) / (2 * camera.focal_length))));
-  // So many of the picture's pixels are one of the panorama's.
+  // One pixel of the panorama is the mean of step x step pixels of the picture.
   const int step = std::max(1, static_cast<int>(std::lround(camera.focal_length / out->per_rad)));
   for (int row = 0; row < out->height; ++row) {
     for (int column = 0; column < out->width; ++column) {

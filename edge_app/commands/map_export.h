@@ -1,5 +1,6 @@
 #pragma once
-// `alidade map export`: keyframes.csv, the keyframes' pictures, and panorama.png, a picture of all that the map has seen.
+// `alidade map export`: writes keyframes.csv, the pictures of the keyframes, and panorama.png,
+// which shows everything that the map has seen.
 
 #include <string>
 

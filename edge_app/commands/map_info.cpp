@@ -11,7 +11,8 @@
 namespace alidade {
 namespace {
 
-// Root mean square of a sighting's error at which a map contradicts itself, of the image's width.
+// A map contradicts itself if the root mean square error of its sightings is larger than this share
+// of the image's width.
 constexpr double kMostResidual = 0.01;
 
 SceneMap require_map(const std::string& path) {

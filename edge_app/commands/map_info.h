@@ -1,5 +1,5 @@
 #pragma once
-// `alidade map info` and `map check`: what a scene map holds, and whether all of it can be.
+// `alidade map info` and `map check`: what a scene map holds, and whether it contradicts itself.
 
 #include <string>
 

@@ -19,26 +19,28 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Of log f by a data sheet: one number, and a range between whose ends the lens goes its own way.
+// Sigma of log f from a data sheet with one number, and with a range. Between the ends of a range
+// the lens need not follow the straight line.
 constexpr double kSheetSigma = 0.02;
 constexpr double kRangeSigma = 0.1;
-// rad, of telemetry's orientation: with a calibration noise and backlash, without one the axes' directions, too.
+// rad, sigma of telemetry's orientation: noise and backlash with a calibration; without one also
+// the directions of the axes.
 constexpr double kCalibratedAngleSigma = 5e-4;
 constexpr double kNominalAngleSigma = 1e-2;
 
-// s, how far telemetry's time may be off the picture's, and what an unknown read-out takes; of a
-// known line delay, what is not known of it.
+// s: how far telemetry's time may be off the picture's, with and without a calibration; how long an
+// unknown read-out takes. kLineDelayShare: relative error of a known line delay.
 constexpr double kKnownClock_s = 0.05;
 constexpr double kUnknownClock_s = 1;
 constexpr double kUnknownReadOut_s = 0.03;
 constexpr double kLineDelayShare = 0.02;
 
-// Telemetry about a time; none before the first sample and after the last.
+// Telemetry, interpolated linearly at a time.
 struct Telling {
-  PanTilt<double> measured;
-  PanTilt<double> rate;  // 1/s
+  PanTilt<double> measured;  // rad
+  PanTilt<double> rate;      // rad/s
   std::optional<double> zoom;
-  double zoom_rate = 0;  // 1/s
+  double zoom_rate = 0;  // device units/s
 };
 
 std::optional<Telling> telling_at(const std::vector<PanTiltSample>& samples, double time_s) {
@@ -64,7 +66,7 @@ std::optional<Telling> telling_at(const std::vector<PanTiltSample>& samples, dou
   return out;
 }
 
-// When telemetry has to be asked about a frame, in its own clock.
+// The time of a frame's middle row on telemetry's clock. Without a calibration its receive time.
 double telemetry_time_of(const MapRecording& recording, const FrameStamp& frame,
                          const Calibration* calibration) {
   if (calibration == nullptr) return frame.receive_time_s;
@@ -207,7 +209,8 @@ MotionDoubt motion_doubt(const MapRecording& recording, const FrameStamp& frame,
   const double time_s = telemetry_time_of(recording, frame, calibration);
   const double window_s = calibration != nullptr ? kKnownClock_s : kUnknownClock_s;
   const std::vector<PanTiltSample>& samples = recording.telemetry;
-  // The sample before the window, or the one before the two about the frame.
+  // Begin two samples before the first one in the window, so that the intervals before the frame
+  // count even if the window is shorter than a sample's period.
   auto first =
       std::lower_bound(samples.begin(), samples.end(), time_s - window_s,
                        [](const PanTiltSample& s, double t) { return s.latest_time_s < t; });
@@ -262,7 +265,7 @@ void for_each_picture(const MapRecording& recording, const std::vector<std::size
     const ReadStatus status = video->read(frame, std::numeric_limits<double>::infinity());
     if (status == ReadStatus::kEnd) return;
     if (status != ReadStatus::kOk) throw CommandError(kExitFailed, video->error());
-    // One that could not be decoded is not among them.
+    // Skip frames whose picture could not be decoded.
     while (next < frames.size() && recording.frames[frames[next]].frame < frame.stamp.frame) {
       ++next;
     }

@@ -1,5 +1,6 @@
 #pragma once
-// What a scene map is made of and asked about: the pictures of a recording, with what its tables and a calibration say of each.
+// The pictures of a recording, with what its tables and a calibration state for each. Scene maps
+// are built from them, and they are localized in scene maps.
 
 #include <functional>
 #include <optional>
@@ -14,18 +15,18 @@
 
 namespace alidade {
 
-// How a zoom reading, where there is one, tells log f.
+// The prior of log f for a zoom reading.
 class FocalLengthKnowledge {
  public:
   // Nothing is known: one lens that does not zoom.
   FocalLengthKnowledge() = default;
-  // A calibration's, at all readings if it has a curve.
+  // From a calibration; for all readings if it has a curve.
   FocalLengthKnowledge(const Calibration& calibration, const ZoomCurve& curve);
-  // A data sheet's: one for all, or from the widest reading to the longest.
+  // From a data sheet: one focal length, or log f linear in the reading between the two ends.
   explicit FocalLengthKnowledge(double px);
   FocalLengthKnowledge(double wide_px, double tele_px, double wide_reading, double tele_reading);
 
-  // None: not known, or no reading where one is needed.
+  // Empty: not known, or a reading is needed and missing.
   [[nodiscard]] std::optional<FocalLengthPrior> at(const std::optional<double>& zoom) const;
   [[nodiscard]] bool needs_reading() const { return needs_reading_; }
 
@@ -34,8 +35,8 @@ class FocalLengthKnowledge {
   bool needs_reading_ = false;
 };
 
-// From what the command line says (a calibration, and --focal-length PX or WIDE:TELE before it); readings: all that there are. Throws
-// CommandError.
+// From the command line: --focal-length PX or WIDE:TELE takes precedence over the calibration.
+// readings: those of all recordings. Throws CommandError.
 [[nodiscard]] FocalLengthKnowledge focal_length_knowledge(const std::string& focal_length,
                                                           const Calibration* calibration,
                                                           const ZoomCurve& curve,
@@ -46,7 +47,7 @@ struct MapRecording {
   std::string directory;
   RecordingInfo info;
   std::vector<FrameStamp> frames;
-  std::vector<PanTiltSample> telemetry;  // empty: none, or not wanted
+  std::vector<PanTiltSample> telemetry;  // by time; empty: none, or not wanted
 
   [[nodiscard]] std::vector<double> zoom_readings() const;
 };
@@ -54,19 +55,22 @@ struct MapRecording {
 // Throws CommandError.
 [[nodiscard]] MapRecording load_map_recording(const std::string& directory, bool with_telemetry);
 
-// What is known of one frame. calibration may be null: nominal mechanics, clocks as they are.
+// What is known of one frame. If `calibration` is null, the mechanics are nominal and the clock
+// offset is 0.
 [[nodiscard]] MapView map_view(const MapRecording& recording, const FrameStamp& frame,
                                const Calibration* calibration, const FocalLengthKnowledge& known);
 
-// What telemetry does not know of the camera's motion while one frame is read out: what its rates
-// differ by about that time, the wider where no calibration tells its clock. view: of this frame.
-// line_delay: s/row; 0: not known, and view's rates tell nothing but a bound.
+// Bounds the error of the camera's motion that telemetry gives for the read-out of one frame: by
+// how much its rates differ about that time. The time window is wider without a calibration, as the
+// clock offset is then not known. view: of this frame. line_delay: s/row; 0: not known, then the
+// rates only give a bound of the motion.
 [[nodiscard]] MotionDoubt motion_doubt(const MapRecording& recording, const FrameStamp& frame,
                                        const Calibration* calibration,
                                        const FocalLengthKnowledge& known, const MapView& view,
                                        double line_delay);
 
-// use(frame, luma) for the pictures of these frames, increasing places in recording.frames. Throws CommandError.
+// Calls use(frame, image) for the pictures of these frames. frames: increasing indices into
+// recording.frames. A frame without a picture is skipped. Throws CommandError.
 void for_each_picture(const MapRecording& recording, const std::vector<std::size_t>& frames,
                       const std::function<void(std::size_t, const ImageView&)>& use);
 

@@ -15,11 +15,11 @@
 namespace alidade {
 namespace {
 
-// Of the keyframes of one octave of focal length.
+// The keyframes of one octave of focal length.
 struct Level {
   std::vector<double> f, f_sigma;  // px
-  std::vector<double> pan,
-      tilt;  // rad, of the optical axis in base, as a level mount would tell them
+  // rad, of the optical axis in the base frame, as a level mount would measure them.
+  std::vector<double> pan, tilt;
   std::size_t landmarks = 0;
 };
 

@@ -1,5 +1,6 @@
 #pragma once
-// What a person and a program read of a scene map: its size, and by zoom what of the sphere it covers and how well f is known. Pure.
+// A scene map as a text for people and as JSON: its size and, for each octave of focal length, what
+// it covers of the sphere and how well f is known. Pure.
 
 #include <string>
 
@@ -11,7 +12,8 @@ namespace alidade {
 // One line. path: of the map.
 [[nodiscard]] std::string map_json(const SceneMap& map, const std::string& path);
 
-// Root mean square of what all sightings of landmarks seen twice or more are off from where the map has them, px; 0: there are none.
+// px, root mean square distance between sightings and the positions that the map predicts. Only
+// landmarks seen twice or more count; 0: there are none.
 [[nodiscard]] double map_residual_px(const SceneMap& map);
 
 }  // namespace alidade

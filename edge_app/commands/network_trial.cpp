@@ -28,10 +28,10 @@
 namespace alidade {
 namespace {
 
-constexpr int kRefused = 3;      // with a line on stdout
-constexpr int kLongest_s = 120;  // for a large network on a small processor
-constexpr rlim_t kMostBytes = rlim_t{4}
-                              << 30;  // of addresses, beside those of a process with this network
+constexpr int kRefused = 3;      // exit code; the reason is on stdout
+constexpr int kLongest_s = 120;  // enough for a large network on a small processor
+// Bytes of address space. Eight times the size of the model come on top.
+constexpr rlim_t kMostBytes = rlim_t{4} << 30;
 
 bool& trials_are_allowed() {
   static bool allowed = false;
@@ -45,7 +45,7 @@ void limit(int resource, rlim_t most) {
   static_cast<void>(::setrlimit(static_cast<__rlimit_resource_t>(resource), &now));
 }
 
-// A sanitizer's shadow takes terabytes of addresses.
+// Not with a sanitizer: its shadow memory takes terabytes of address space.
 void limit_addresses([[maybe_unused]] std::size_t model_bytes) {
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
   if constexpr (sizeof(void*) > 4) limit(RLIMIT_AS, kMostBytes + 8 * rlim_t{model_bytes});
@@ -84,7 +84,7 @@ std::optional<Trial> begin_trial(const std::string& model, const NetworkOptions&
   return trial;
 }
 
-// What it says until it ends. False: it did not within the time.
+// Reads what the process says until it ends. False: it did not end in time.
 bool hear(int from, std::string* said) {
   const double end_s = monotonic_now_s() + kLongest_s;
   for (;;) {
@@ -121,7 +121,7 @@ bool survives_trial(const std::string& model, const NetworkOptions& options, std
   while (::waitpid(trial->process, &status, 0) < 0 && errno == EINTR) {
   }
   if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return true;
-  // An emulator that cannot begin another.
+  // 127: under an emulator that cannot start another program.
   if (WIFEXITED(status) && WEXITSTATUS(status) == 127) return true;
   const bool refused = WIFEXITED(status) && WEXITSTATUS(status) == kRefused && !said.empty();
   *error =

@@ -1,7 +1,8 @@
 #pragma once
-// A user's network, loaded first in a process of its own: this program, begun anew with an option that nobody else uses. A file that
-// was cut, changed or forged can end the library that reads it, or have it ask for all memory; then only that process ends, and the
-// file is refused. It has limits of memory and time, no core dump, and dies with the process that began it.
+// Loads a user's network first in a process of its own: this program, started again with a hidden
+// option. A file that was cut, changed or forged can crash the library that reads it, or make it
+// take all memory. Then only that process ends, and the file is refused. The process has limits of
+// memory and time, leaves no core dump, and dies with its parent.
 
 #include <string>
 
@@ -11,14 +12,16 @@ namespace alidade {
 
 inline constexpr const char* kNetworkTrial = "--try-network";
 
-// By main(), in the program that knows the option.
+// Called by main() of the program that knows the option. Without it there are no trials.
 void allow_network_trials();
 
-// False with one line: what the detector said of it, or how it ended. True too where no process can be begun.
+// False with one line: the detector's error, or how the process ended. Also true if trials are not
+// allowed or the process cannot be started.
 [[nodiscard]] bool survives_trial(const std::string& model, const NetworkOptions& options,
                                   std::string* error);
 
-// The other end: the model is stdin, what is said of it goes to stdout.
+// The trial's process: reads the model from stdin and prints the error on stdout. Returns its exit
+// code.
 int run_network_trial(int argc, char** argv);
 
 }  // namespace alidade

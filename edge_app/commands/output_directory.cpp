@@ -20,7 +20,7 @@ const OutputLock* held = nullptr;
 void change_endings(void (*from)(int), void (*to)(int)) {
   for (const int signal : kEndings) {
     struct sigaction now = {};
-    // What somebody else handles or ignores stays so.
+    // Leave a signal alone that others handle or ignore.
     if (::sigaction(signal, nullptr, &now) != 0 || now.sa_handler != from) continue;
     struct sigaction next = {};
     next.sa_handler = to;
@@ -52,7 +52,8 @@ OutputLock::OutputLock(const std::string& file) {
   change_endings(SIG_DFL, &OutputLock::end);
 }
 
-// Only what a handler may call; the signal does what it would have done as soon as this returns.
+// Signal handler: calls only async-signal-safe functions. The raised signal has its default effect
+// as soon as this returns.
 void OutputLock::end(int signal) {
   if (!held->lock_.made().empty()) static_cast<void>(::unlink(held->lock_.made().c_str()));
   for (const std::string& folder : held->made_) static_cast<void>(::rmdir(folder.c_str()));

@@ -1,5 +1,6 @@
 #pragma once
-// Where a command leaves its files: made if it is not there. What cannot be written ends the command.
+// The directory in which a command leaves its files. It is made if it does not exist. If a file
+// cannot be written, the command ends.
 
 #include <functional>
 #include <string>
@@ -10,15 +11,18 @@
 
 namespace alidade {
 
-// given: of -o; empty: `alidade` in the recording, or beside it if it is a file.
+// given: the argument of -o. If it is empty: `alidade` in the recording's directory, or beside the
+// recording if that is a file.
 [[nodiscard]] std::string output_path(const std::string& given, const std::string& recording);
 
-// Held while a command makes what it will write: another one that would write there says who has it, as where a `run` keeps its
-// calibrations in that file. Makes the file's folder, and leaves nothing of its own behind, not even where SIGINT, SIGTERM or SIGHUP
-// ends the program meanwhile. Where there can be no lock there is none. One at a time.
+// A lock on an output file, held while a command works. Another command that would write the file
+// fails and names the holder. A `run` that stores its calibrations in that file holds the same
+// lock. Makes the file's folder. Leaves nothing of its own behind, even if SIGINT, SIGTERM or
+// SIGHUP ends the program. Where the file system has no locks, none is taken. Only one object may
+// exist at a time.
 class OutputLock {
  public:
-  // Throws CommandError where it is in use.
+  // Throws CommandError if the file is in use.
   explicit OutputLock(const std::string& file);
   ~OutputLock();
   OutputLock(const OutputLock&) = delete;
@@ -28,20 +32,21 @@ class OutputLock {
   static void end(int signal);
 
   FileLock lock_;
-  std::vector<std::string> made_;  // folders, the innermost first
+  std::vector<std::string> made_;  // folders, innermost first
 };
 
 class OutputDirectory {
  public:
-  // Of output_path(). Throws CommandError.
+  // The arguments of output_path(). Throws CommandError.
   OutputDirectory(const std::string& given, const std::string& recording);
 
-  // write(path, &error) -> bool. Remembers the file under `kind`. Throws CommandError.
+  // Writes a file and remembers it under `kind`. write(path, &error) returns success. Throws
+  // CommandError.
   using Write = std::function<bool(const std::string&, std::string*)>;
   void add(const char* kind, const char* name, const Write& write);
   void add(const char* kind, const char* name, const std::string& text);
 
-  // Kind and path of each, in the order of writing.
+  // Kind and path of each file, in the order of writing.
   [[nodiscard]] const std::vector<std::pair<std::string, std::string>>& files() const {
     return files_;
   }

@@ -26,7 +26,7 @@ PartialFile::PartialFile(std::string path)
 
 PartialFile::~PartialFile() {
   std::error_code ignored;
-  fs::remove(partial_, ignored);  // gone already after complete()
+  fs::remove(partial_, ignored);  // after complete() there is none
 }
 
 void PartialFile::complete() {

@@ -1,5 +1,6 @@
 #pragma once
-// A file that has its name only when it is whole: until complete() it is NAME.partial, which goes with this object.
+// A file that gets its name only when it is complete. Until complete() it is NAME.partial, which
+// the destructor removes.
 
 #include <string>
 
@@ -9,7 +10,7 @@ namespace alidade {
 
 class PartialFile {
  public:
-  // Throws CommandError where it cannot be written, as complete() does.
+  // Throws CommandError if the file cannot be written; so does complete().
   explicit PartialFile(std::string path);
   ~PartialFile();
   PartialFile(const PartialFile&) = delete;

@@ -17,9 +17,10 @@ namespace alidade {
 namespace {
 
 constexpr std::size_t kLeastForLine = 3;
-constexpr double kMuchJitter = 0.1;  // of a period
-constexpr double kRunApart_s =
-    0.05;  // in all, of a sender's clock and the arrivals: more than frames are late by at random
+constexpr double kMuchJitter = 0.1;  // share of a period
+// The sender's clock and the arrivals drift apart by more than this over the whole connection. That
+// is more than the random delay of frames.
+constexpr double kRunApart_s = 0.05;
 
 bool increases(const std::vector<double>& times) {
   return std::adjacent_find(times.begin(), times.end(),
@@ -81,7 +82,7 @@ bool PatternSearch::look(const Frame& frame) {
 }
 
 void PatternSearch::undo_half_turns() {
-  constexpr double kFollowed = 10;  // images, in the mean
+  constexpr double kFollowed = 10;  // mean periods between two searched images
   const std::vector<PatternFrame>& frames = video_.data.frames;
   const double all_s = frames.back().time_s - frames.front().time_s;
   follow_half_turns(pattern_, kFollowed * all_s / static_cast<double>(frames.size() - 1),
@@ -146,7 +147,8 @@ std::vector<double> PatternSearch::times_of(Span span) {
   return line.time_s;
 }
 
-// Each connection's clock begins anew: several are put side by side by the host's clock, as late as the least late frame was.
+// Each connection has a clock of its own. Several connections are aligned by the host's clock: each
+// is shifted so that its least delayed frame has no delay.
 std::vector<double> PatternSearch::all_times() {
   const std::vector<Span> spans = connections();
   std::vector<double> times;
@@ -159,7 +161,7 @@ std::vector<double> PatternSearch::all_times() {
         shift_s = std::min(shift_s, stamps_[span.begin + i].receive_time_s - own[i]);
     }
     if (!times.empty()) {
-      // What a relay kept from before would lie beside the last ones.
+      // Frames that a relay had stored before must not overlap those of the last connection.
       const double least_s = times.back() + (own.size() > 1 ? own[1] - own[0] : 1e-3) - own[0];
       shift_s = std::max(shift_s, least_s);
       video_.remarks.push_back(

@@ -1,10 +1,11 @@
 #pragma once
-// PatternSearch: the frames of a video, one after the other, become PatternVideo: the pattern's points in them, on a steady clock.
-// Images that repeat the one before are left out, lost ones noticed, stamps that jitter put right (fit_clock_line), each connection's
-// by itself; what lies between two is a gap.
+// PatternSearch: turns the frames of a video into a PatternVideo: the points of the pattern in each
+// image, on a steady clock. Images that repeat the one before are left out. Lost frames are
+// noticed. Jittering time stamps are corrected (fit_clock_line), for each connection by itself.
+// Between two connections there is a gap.
 //
-// Stamps of all frames go into the clock, also of those whose image nobody looked at: note() and look() share no state, so that
-// a thread may read while another looks.
+// The time stamps of all frames go into the clock, also those of images that were not searched.
+// note() and look() share no state, so one thread may read while another searches.
 
 #include <cstddef>
 #include <cstdint>
@@ -22,13 +23,13 @@ namespace alidade {
 struct PatternVideo {
   std::string name;  // of the video, for messages
   PatternData data;
-  int images = 0;                    // looked at, or found to be
-  int repeated = 0;                  // the same image again
-  int skipped = 0;                   // came while others were looked at
+  int images = 0;                    // searched, and repeated ones
+  int repeated = 0;                  // same image as the one before
+  int skipped = 0;                   // came while another one was searched
   int found = 0;                     // images with the pattern
-  int lost = 0;                      // by the stamps
+  int lost = 0;                      // missing according to the time stamps
   std::vector<std::string> remarks;  // about the video
-  std::string doubt;  // what is there in place of the pattern; empty: nothing is known
+  std::string doubt;  // what the images show in place of the pattern; empty: nothing is known
 };
 
 class PatternSearch {
@@ -36,55 +37,59 @@ class PatternSearch {
   // name: of the video, for messages.
   PatternSearch(std::string name, const KnownPattern& pattern);
 
-  // To be told of every frame. True: its image is one to look at. Throws CommandError: an image too small, or of another size.
+  // Must be called for every frame. True: its image should be searched. Throws CommandError if an
+  // image is too small or has another size than those before.
   [[nodiscard]] bool note(const Frame& frame);
 
-  // Frames that were noted, in their order, not necessarily all. True: the pattern is in it.
+  // Searches a frame. Frames must have been noted and come in the same order; some may be left out.
+  // True: the pattern was found.
   bool look(const Frame& frame);
 
-  // look()'s thread: what it has found so far; times are those of arrival.
+  // For the thread of look(): what it has found so far. Times are arrival times.
   [[nodiscard]] const PatternData& found_so_far();
 
-  // look()'s thread: what the images show in place of the pattern; empty: nothing is known.
+  // For the thread of look(): what the images show in place of the pattern; empty: nothing is
+  // known.
   [[nodiscard]] std::string doubt() const { return detector_.doubt(); }
 
-  // Ends it. Throws CommandError: too few images, stamps that do not increase.
+  // Ends the search. Throws CommandError if there are too few images, or if the time stamps do not
+  // increase.
   [[nodiscard]] PatternVideo finish();
 
  private:
-  // A connection's stamps and what became of them.
+  // The indices into stamps_ of one connection.
   struct Span {
     std::size_t begin = 0;
     std::size_t end = 0;
   };
   [[nodiscard]] std::vector<Span> connections() const;
-  // Row 0's exposure of each of its frames, on a steady clock where there is one.
+  // The time of row 0 for each frame of the connection, on a steady clock if there is one.
   [[nodiscard]] std::vector<double> times_of(Span span);
   [[nodiscard]] std::vector<double> all_times();
   void remark_clock();
-  // A symmetric pattern's points, the same way round from image to image.
+  // Numbers the points of a symmetric pattern the same way in all images.
   void undo_half_turns();
 
   const std::string name_;
   const KnownPattern pattern_;
-  // note()'s.
-  std::vector<FrameStamp> stamps_;       // of all but repeated images
+  // Used by note().
+  std::vector<FrameStamp> stamps_;       // of all frames except repeated ones
   std::optional<std::uint64_t> before_;  // digest of the image before
   int width_ = 0;
   int height_ = 0;
   int repeated_ = 0;
   int to_look_at_ = 0;
   bool interlaced_ = false;
-  // look()'s.
+  // Used by look().
   PatternDetector detector_;
   PatternVideo video_;
   std::vector<std::int64_t> looked_;  // FrameStamp::frame of each of video_.data.frames
-  // finish()'s.
+  // Used by finish().
   bool unsteady_ = false;
   bool stamps_left_out_ = false;
-  double worst_scatter_ = 0;  // of a period
-  double scatter_s_ = 0;
-  double period_s_ = 0;
+  double worst_scatter_ = 0;  // share of a period
+  double scatter_s_ = 0;      // s, of the same connection
+  double period_s_ = 0;       // s, of the same connection
 };
 
 }  // namespace alidade

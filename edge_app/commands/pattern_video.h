@@ -1,5 +1,5 @@
 #pragma once
-// The pattern in a recording or a video file, every image of it.
+// Searches each image of a recording or a video file for the pattern.
 
 #include <functional>
 #include <string>
@@ -8,8 +8,8 @@
 
 namespace alidade {
 
-// progress: images so far; false ends the reading (CommandError). Throws CommandError: no or unreadable video, images that change
-// their size.
+// progress: called with the number of images so far; if it returns false, the search ends with
+// CommandError. Also throws CommandError if there is no readable video or the image size changes.
 [[nodiscard]] PatternVideo find_pattern(const std::string& video, const KnownPattern& pattern,
                                         const std::function<bool(int images, int found)>& progress);
 

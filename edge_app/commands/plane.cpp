@@ -1,5 +1,5 @@
-// `alidade plane fit`: from what somebody knows of the ground under a camera to plane.yaml. A plane that is not determined, or that
-// one of the data contradicts, is reported and not written.
+// `alidade plane fit`: makes plane.yaml from what is known of the ground under a camera. If the
+// plane is not determined, or a datum contradicts it, that is reported and nothing is written.
 
 #include "edge_app/commands/plane.h"
 #include "core/calibration/number_text.h"
@@ -28,7 +28,7 @@ namespace {
 
 bool is_angle(int value) { return value < 3; }
 
-// What an answer to a request may cost: each picture has three unknowns of its own.
+// Limits of the work for one request. Each picture adds three unknowns.
 constexpr std::size_t kMostDataOfRequest = 100;
 constexpr std::size_t kMostPicturesOfRequest = 8;
 constexpr int kDeepestDatum = 5;  // {"lengths": [{"from": {"direction": [x]}}]}
@@ -93,7 +93,7 @@ void print_plane(const std::string& text) {
   if (std::fflush(stdout) != 0) throw CommandError(kExitFailed, "stdout: cannot be written");
 }
 
-// What the data lead to must not take their place.
+// The result must not overwrite the data.
 std::string output_path(const PlaneOptions& options) {
   namespace fs = std::filesystem;
   const fs::path path = options.output.empty() ? fs::path(options.data).parent_path() / "plane.yaml"
@@ -132,7 +132,7 @@ bool answer_plane_fit(const std::string& body, std::string* answer, std::string*
       "format",  "origin",   "height",    "level",   "heading",  "place", "points",
       "horizon", "bearings", "verticals", "lengths", "uprights", "image", "pictures"};
   Json object;
-  // JSON is YAML; what is read as such is bounded here in depth.
+  // JSON is YAML, so the YAML reader takes it. The depth is limited before that.
   if (!parse_json_object(body, kDeepestDatum, kKeys, &object, error)) return false;
   PlaneData data;
   if (!parse_plane_data(object.dump(), "body", &data, error)) return false;

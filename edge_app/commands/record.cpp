@@ -1,6 +1,6 @@
-// `alidade record`: the live streams as a recording. The video stream is copied by its source, not
-// encoded again; the stamps of both streams go to the recording's tables. The recording begins with
-// the first frame, and so does its duration; telemetry from shortly before it is kept.
+// `alidade record`: stores the live streams as a recording. The source copies the video stream
+// without encoding it again. The time stamps of both streams go to the recording's tables. The
+// recording and its duration begin with the first frame. Telemetry from shortly before is kept.
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
@@ -46,13 +46,13 @@ void prepare_directory(const std::string& directory) {
   }
 }
 
-// What the configuration knows and a later calibration or replay of the recording needs.
+// Writes what the configuration states and a later calibration or replay needs.
 void write_side_files(const Config& config, const std::string& directory) {
   if (config.pan_tilt.angle_sigma_rad) {
     std::ofstream(fs::path(directory) / "noise.yaml")
         << fmt::format("pan_tilt_sigma_rad: {}\n", *config.pan_tilt.angle_sigma_rad);
   }
-  // Which of its focal lengths a lens that zooms will have nobody knows.
+  // The focal length of a zoom lens is not known in advance.
   if (config.camera.focal_length_px && !config.camera.focal_length_range) {
     const Camera<double>& camera = data_sheet_calibration(config.camera).camera;
     std::ofstream(fs::path(directory) / "guess.yaml")
@@ -89,8 +89,8 @@ class Recorder {
     threads_.clear();
   }
 
-  // Polls readable when the first frame was stored, the video was lost, a stream failed for good,
-  // or the disk takes no more, until forget_news().
+  // Becomes readable when the first frame was stored, the video was lost, a stream failed for good,
+  // or the disk takes no more. forget_news() resets it.
   [[nodiscard]] int news_fd() const { return news_; }
   void forget_news() {
     eventfd_t ignored = 0;
@@ -105,18 +105,18 @@ class Recorder {
     const double at_s = begin_s_;
     return at_s > 0 ? std::optional(at_s) : std::nullopt;
   }
-  // From the first stored frame to the last, with the last one's period.
+  // From the first stored frame to the last, plus one frame period.
   [[nodiscard]] double length_s() const {
     const double span_s = last_receive_s_ - first_receive_s_;
     return frames_ > 1 ? span_s * static_cast<double>(frames_) / static_cast<double>(frames_ - 1)
                        : 0;
   }
-  // Nobody is there, as far as the last attempt says.
+  // The last attempt to read found no camera.
   [[nodiscard]] bool is_lost() const { return lost_; }
   [[nodiscard]] long frames() const { return frames_; }
   [[nodiscard]] long samples() const { return samples_; }
 
-  // After stop(): brings the rows to the disk and says what went wrong first, if anything.
+  // Only after stop(): writes the rows to the disk. Returns the first error, or an empty text.
   std::string finish() {
     std::string error;
     if (open_ && !writer_.flush(&error)) fail(error);
@@ -150,7 +150,7 @@ class Recorder {
       }
       return true;
     };
-    LinkWatch watch;  // nobody asks it
+    LinkWatch watch;  // required, not used
     const auto on_loss = [this](double) {
       lost_ = true;
       static_cast<void>(::eventfd_write(news_, 1));
@@ -172,13 +172,13 @@ class Recorder {
       }
       return true;
     };
-    LinkWatch watch;  // nobody asks it
+    LinkWatch watch;  // required, not used
     const std::string error =
         read_to_the_end<PanTiltSample>(pan_tilt_, &watch, on_sample, [](double) {});
     if (!error.empty()) fail(error);
   }
 
-  // The first of two threads to fail is heard. False, for its callers to return.
+  // Keeps the first error of the two threads. Always false, so that callers can return it.
   bool fail(const std::string& error) {
     const std::lock_guard<std::mutex> lock(error_mutex_);
     if (error_.empty()) error_ = error;
@@ -205,7 +205,8 @@ class Recorder {
   std::vector<std::thread> threads_;
 };
 
-// Until so much is stored (true), no frame has come for long, something failed, or a signal came.
+// Waits until duration_s is stored or the first frame is overdue (true), or until a stream failed
+// or a signal came (false).
 bool wait_with_progress(StopSignals& signals, Recorder& recorder, double duration_s) {
   constexpr double kProgressPeriod_s = 1;
   // A stream may begin with many seconds without a key frame.
@@ -232,9 +233,9 @@ bool wait_with_progress(StopSignals& signals, Recorder& recorder, double duratio
   }
 }
 
-// The streams have ended: what of the time that was asked for is not there.
+// Called after the streams have ended: warns if less was stored than asked for.
 void say_what_is_missing(const std::string& directory, const Recorder& recorder, double asked_s) {
-  // Frames at both ends may be on their way.
+  // Frames at both ends may still be in transit.
   constexpr double kShare = 0.95;
   if (recorder.frames() > 0 && recorder.length_s() < kShare * asked_s) {
     spdlog::warn(

@@ -1,5 +1,5 @@
 #pragma once
-// `alidade record`. Its options bear the names of the command line (command_line.cpp), checked there.
+// `alidade record`. The command line (command_line.cpp) names the options as here and checks them.
 
 #include <limits>
 #include <string>
@@ -12,7 +12,7 @@ struct RecordOptions {
   double duration_s = std::numeric_limits<double>::infinity();
 };
 
-// The live streams as a recording. Returns the exit code; throws CommandError.
+// Stores the live streams as a recording. Returns the exit code; throws CommandError.
 [[nodiscard]] int record_streams(const RecordOptions& options);
 
 }  // namespace alidade

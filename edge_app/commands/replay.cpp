@@ -1,9 +1,9 @@
-// `alidade replay`: the real-time step over a recording, on one thread: telemetry up to a frame's
-// receive time is known when the frame is answered, and nothing later is. So the answer is what
-// a live step would have given, and the same in each replay. But for one thing: that the first frames had not waited for
-// long the later ones show, and a replay need not wait for them.
-// In OE mode images are decoded besides; a frame whose image cannot be is answered from telemetry.
-// It reads no configuration: how long telemetry holds is the default of TelemetryLimits.
+// `alidade replay`: runs the real-time step over a recording, on one thread. A frame is answered
+// with the telemetry received up to its receive time, as in a live run. So each replay gives the
+// same records as the live step would have. One exception: a live run must wait to learn whether
+// the first frames were delayed; a replay sees it in the later frames. OE mode also decodes images.
+// A frame whose image cannot be decoded is answered from telemetry. No configuration is read:
+// TelemetryLimits has its defaults.
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
@@ -40,7 +40,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// The records' file, which has its name only when it is whole.
+// The file of the records. It gets its name only when it is complete.
 class OrientationFile {
  public:
   explicit OrientationFile(const std::string& directory)
@@ -101,7 +101,7 @@ bool has_images(const std::string& recording) {
          fs::is_directory(fs::path(recording) / "frames", ignored);
 }
 
-// The images of a recording whose frames are counted by another source: some frames may have none.
+// The images of a recording. Another source counts its frames; some frames may have no image.
 class Images {
  public:
   explicit Images(const std::string& recording)
@@ -112,7 +112,8 @@ class Images {
     }
   }
 
-  // The image of the frame with this stamp, none if it is missing. Asked once for each frame, in order.
+  // The image of the frame with this stamp; empty if it is missing. Call it once for each frame, in
+  // order.
   std::optional<Frame> of(const FrameStamp& stamp) {
     std::optional<Frame> frame;
     if (next_ && next_->stamp.frame == stamp.frame &&
@@ -158,7 +159,7 @@ ImageView view_of(const std::optional<Frame>& image) {
   return {image->luma, image->width, image->height, image->stride};
 }
 
-// What the last two lines tell.
+// Counts for the last two lines of the log.
 class Summary {
  public:
   explicit Summary(bool wants_landmarks) : reasons_(wants_landmarks) {}
@@ -208,7 +209,7 @@ int replay_recording(const ReplayOptions& options) {
   OrientationStepOptions of_step = step_options(noise, calibration);
   of_step.zoom_tolerance = options.zoom_tolerance;
   if (images) of_step.oe = oe_options(calibration.calibration.camera);
-  // Stamps that scatter to both sides are no arrivals.
+  // Time stamps that scatter to both sides are not arrival times, so they show no delay.
   of_step.wait_for_pace = !noise.image_stamp_sigma_s;
   OrientationStep step(of_step);
   std::vector<FrameStamp> stamps;
@@ -222,7 +223,7 @@ int replay_recording(const ReplayOptions& options) {
                                     ? (fs::path(options.recording) / "alidade").string()
                                     : options.directory;
   std::error_code not_made;
-  fs::create_directories(directory, not_made);  // that it cannot be written says the file
+  fs::create_directories(directory, not_made);  // on failure OrientationFile reports the error
   OrientationFile file(directory);
   std::optional<ReplayTargets> targets;
   if (!options.detections.empty()) {
@@ -243,7 +244,7 @@ int replay_recording(const ReplayOptions& options) {
   while (const std::optional<Frame> frame = next<Frame>(*video)) {
     const FrameStamp& stamp = frame->stamp;
     if (!first_s) first_s = stamp.receive_time_s;
-    // A live frame is due when it was received; stamps that jump back are due at once.
+    // A frame is due when it was received. If time stamps jump back, it is due at once.
     const double wait_s =
         options.realtime ? start_s + (stamp.receive_time_s - *first_s) - monotonic_now_s() : 0;
     if (signals.wait(-1, wait_s) == StopSignals::Event::kSignal) {

@@ -1,5 +1,5 @@
 #pragma once
-// `alidade replay`. Its options bear the names of the command line (command_line.cpp), checked there.
+// `alidade replay`. The command line (command_line.cpp) names the options as here and checks them.
 
 #include <optional>
 #include <string>
@@ -12,15 +12,15 @@ struct ReplayOptions {
   std::string calibration;  // empty: <recording>/alidade/calibration.yaml
   std::string mode;         // "OE", "PT"; empty: OE if there are images
   std::string detections;   // JSON Lines; "-": stdin; empty: none
-  std::string tracking;     // a configuration, of which section tracking counts; empty: the sphere
-  // Device units within which two zoom readings are one; none: as their jitter shows.
+  std::string tracking;     // a configuration with section `tracking`; empty: on the sphere
+  // Device units; readings that differ by no more are one zoom. Empty: found from their jitter.
   std::optional<double> zoom_tolerance;
   bool realtime = false;
   bool json = false;
   bool csv = false;
 };
 
-// The real-time modes over a recording. Returns the exit code; throws CommandError.
+// Runs the real-time step over a recording. Returns the exit code; throws CommandError.
 [[nodiscard]] int replay_recording(const ReplayOptions& options);
 
 }  // namespace alidade

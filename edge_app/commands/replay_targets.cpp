@@ -60,7 +60,7 @@ ReplayTargets::ReplayTargets(const std::string& detections, const std::string& t
 bool ReplayTargets::read_line(std::string* line) {
   for (;;) {
     const std::size_t end = buffer_.find('\n', begin_);
-    // However it came in pieces.
+    // The limit holds for any division of the line into pieces.
     if (std::min(end, buffer_.size()) - begin_ > kMaxDetectionBytes)
       throw CommandError(kExitFailed, fmt::format("{}:{}: is longer than {} bytes; expected one "
                                                   "frame a line",
@@ -75,7 +75,7 @@ bool ReplayTargets::read_line(std::string* line) {
     if (ended_) return false;
     buffer_.erase(0, begin_);
     begin_ = 0;
-    // What waits for a slow writer still ends with a signal.
+    // A signal must end the wait for a slow writer.
     if (signals_->wait(in_, std::numeric_limits<double>::infinity()) == StopSignals::Event::kSignal)
       throw CommandError(kExitFailed, "replay interrupted; nothing stored");
     constexpr std::size_t kPiece = std::size_t{64} << 10;
@@ -89,7 +89,7 @@ bool ReplayTargets::read_line(std::string* line) {
   }
 }
 
-// The next frame of detections into waiting_. False: there is none.
+// Reads the next frame of detections into waiting_. False: there is none.
 bool ReplayTargets::next() {
   std::string text;
   do {

@@ -1,9 +1,10 @@
 #pragma once
-// ReplayTargets: detections of a file or of stdin, beside a replay's records, to targets.jsonl. JSON Lines: each as POST /api/v1/detections has it.
-// A line is read when a record has come and those before it are done with, and waits until its frame has a record; a line for the frame at
-// hand ends the reading until the next record. So a detector that is told each record may answer it, lines may be late, and the same
-// lines give the same bytes. A line that cannot be read is an error with its number; frames that a
-// live run would refuse, and boxes that it leaves out, are told at the end.
+// ReplayTargets: makes targets.jsonl from a replay's records and from detections in a file or on
+// stdin. Detections are JSON Lines, each like the body of POST /api/v1/detections.
+// After each record, lines are read until one is for that record's frame or for a later frame; the
+// latter waits for its record. So a detector that reads the records may answer them, lines may be
+// late, and the same lines give the same bytes. A line that cannot be read is an error with its
+// number. Frames and boxes that a live run would refuse are counted and reported at the end.
 
 #include <cstddef>
 #include <cstdint>
@@ -23,13 +24,14 @@ namespace alidade {
 
 class ReplayTargets {
  public:
-  // detections: a file, or "-" for stdin. tracking: a configuration whose section tracking counts; empty: the sphere, and defaults.
-  // Results appear as path when all is done. Throws CommandError, as all here.
+  // detections: a file, or "-" for stdin. tracking: a configuration with section `tracking`; empty:
+  // the sphere and its defaults. path: the result; it appears in complete(). All functions here
+  // throw CommandError.
   ReplayTargets(const std::string& detections, const std::string& tracking, std::string path,
                 StopSignals* signals);
 
   void add(const OrientationRecord& record);
-  // What lines are left; the file gets its name. One line about it all.
+  // Reads the remaining lines and gives the file its name. Returns one line of statistics.
   [[nodiscard]] std::string complete();
 
  private:
@@ -38,7 +40,7 @@ class ReplayTargets {
   [[nodiscard]] bool is_due() const;
   void take();
 
-  const std::string name_;  // of the lines' file, for messages
+  const std::string name_;  // of the detections' file, for messages
   StopSignals* signals_;
   TargetStage stage_;
   LiveState records_;
@@ -47,7 +49,7 @@ class ReplayTargets {
   PartialFile out_;
   LineWriter writer_;
   std::string buffer_;
-  std::size_t begin_ = 0;  // of what is left of it
+  std::size_t begin_ = 0;  // of the unread part of buffer_
   bool ended_ = false;
   std::int64_t line_ = 0;
   std::optional<DetectionQuery> waiting_;

@@ -1,6 +1,6 @@
-// `alidade run`: live orientation of each frame, by a camera that calibrates itself. The threads are the
-// Pipeline's; this one waits for a signal, the end of the time asked for, or the end of the pipeline, and meanwhile
-// tells systemd that they live.
+// `alidade run`: live orientation of each frame; the camera calibrates itself. The Pipeline has the
+// threads. This one waits for a signal, the end of the duration or the end of the pipeline, and
+// meanwhile tells systemd that the threads are alive.
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
@@ -56,7 +56,7 @@ PipelineOptions pipeline_options(const Config& config, const NamedCalibration& c
   return options;
 }
 
-// Null where none is configured.
+// Null if no server is configured.
 std::unique_ptr<HttpServer> start_http(const Config& config, const HttpApiSources& sources,
                                        ImageTap* tap) {
   if (!config.output.http) return nullptr;
@@ -74,7 +74,7 @@ std::unique_ptr<HttpServer> start_http(const Config& config, const HttpApiSource
   return server;
 }
 
-// Null where no broker is configured.
+// Null if no broker is configured.
 std::unique_ptr<MqttPublisher> make_mqtt(const Config& config, LiveTargets* targets) {
   if (!config.mqtt) return nullptr;
   const std::string error = MqttConnection::files_error(*config.mqtt);
@@ -88,7 +88,7 @@ std::unique_ptr<MqttPublisher> make_mqtt(const Config& config, LiveTargets* targ
   return mqtt;
 }
 
-// Waits for a signal, the end of the pipeline, or the end of the time asked for.
+// Waits for a signal, the end of the pipeline or the end of the duration.
 void wait_for_the_end(StopSignals* signals, const Pipeline& pipeline, LifeReport* report,
                       double duration_s) {
   const double end_s = monotonic_now_s() + duration_s;
@@ -133,13 +133,13 @@ int run_live(const RunOptions& options) {
   const auto pan_tilt = make_pan_tilt_source(config.pan_tilt);
   spdlog::info("video: {}; pan/tilt: {}", video->name(), pan_tilt->name());
   spdlog::info("real-time thread: {}", describe(of_pipeline.realtime));
-  // A recording's records come as fast as they are taken, and none is to be missing.
+  // With a recording, records may wait for the reader, as none must be missing.
   const auto stalled =
       is_recording(config) ? RecordWriter::Stalled::kWait : RecordWriter::Stalled::kDrop;
   RecordWriter writer(STDOUT_FILENO, format.value_or(OutputFormat::kJson), "stdout", stalled);
   LiveState live;
   RecordSinks sinks;
-  // First: these are there at once.
+  // First, as this sink never waits.
   if (config.output.http) sinks.add(&live);
   const std::unique_ptr<LiveTargets> targets = make_live_targets(config, plane);
   const std::unique_ptr<MqttPublisher> mqtt = make_mqtt(config, targets.get());

@@ -1,5 +1,5 @@
 #pragma once
-// `alidade run`. Its options bear the names of the command line (command_line.cpp), checked there.
+// `alidade run`. The command line (command_line.cpp) names the options as here and checks them.
 
 #include <limits>
 #include <string>
@@ -13,7 +13,8 @@ struct RunOptions {
   bool csv = false;
 };
 
-// Live: a record for each video frame, until it is told to stop. Returns the exit code; throws CommandError.
+// Writes a record for each live video frame until a signal or the end of the duration. Returns the
+// exit code; throws CommandError.
 [[nodiscard]] int run_live(const RunOptions& options);
 
 }  // namespace alidade

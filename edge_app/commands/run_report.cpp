@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kStatusPeriod_s = 10;
 
-// What `systemctl status` shows of the time between two summaries.
+// The text that `systemctl status` shows: the counts between two summaries.
 std::string describe(const PipelineSummary& before, const PipelineSummary& now, double period_s) {
   const auto records = now.records - before.records;
   const auto with_orientation = now.with_orientation - before.with_orientation;

@@ -1,6 +1,6 @@
 #pragma once
-// What `alidade run` tells of itself beside its records: the last lines of its log, of which
-// `replay` has one too, and a service manager.
+// What `alidade run` reports beside its records: the last lines of its log (`replay` has one of
+// them, too), and its state to a service manager.
 
 #include <string>
 
@@ -9,19 +9,20 @@
 
 namespace alidade {
 
-// Frames, records of each mode, latency and its parts, losses, page faults: one line.
+// One line: frames, records of each mode, latency and its parts, losses, page faults.
 [[nodiscard]] std::string describe(const PipelineSummary& summary, bool latency_measured);
 
-// Why records were not in OE mode (reason_counts.h), and what zoom readings the calibration is for
-// where that is the reason. Empty: all were.
+// Why records were not in OE mode (reason_counts.h). If the zoom was the reason, also the readings
+// that the calibration covers. Empty: all records were in OE mode.
 [[nodiscard]] std::string describe(const ReasonCounts& reasons, const Calibration& calibration,
                                    const ZoomCurve& curve);
 
-// Tells a service manager, once a period, what goes on, and that the process lives as long as records get through. A
-// camera that is gone is no reason to be killed; a thread that hangs is.
+// Reports to a service manager once a period: the state and, as long as records get through the
+// threads, that the process is alive. A missing camera is no reason to be killed. A thread that
+// hangs is.
 class LifeReport {
  public:
-  // Borrows both.
+  // Both must outlive this object.
   LifeReport(const ServiceManager& manager, Pipeline* pipeline);
 
   // s; infinite without a service manager.
@@ -32,8 +33,8 @@ class LifeReport {
   const ServiceManager& manager_;
   Pipeline& pipeline_;
   bool lived_ = true;
-  PipelineSummary status_;  // told last
-  double status_s_;
+  PipelineSummary status_;  // of the last report of the state
+  double status_s_;         // time of that report
 };
 
 }  // namespace alidade

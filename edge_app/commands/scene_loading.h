@@ -1,5 +1,5 @@
 #pragma once
-// The scene map that a configuration names, for the commands that ask it where pictures look.
+// Opens the scene map that a configuration names, for the commands that localize pictures in it.
 
 #include <memory>
 #include <string>
@@ -13,12 +13,12 @@ namespace alidade {
 
 [[nodiscard]] bool has_telemetry(const Config& config);
 
-// False: *error, one line: it cannot be read, or is of pictures of another size than width x height.
+// False with one line in *error: the map cannot be read, or its pictures are not width x height px.
 [[nodiscard]] bool open_scene(const SceneMapConfig& config, int width, int height,
                               SceneMapFile* file, SceneMap* map, std::string* error);
 
-// Null where none is configured, or none that could be used: records need none, and go on without, in telemetry's base. Where there
-// is no telemetry, it throws.
+// Null if no map is configured, the mode is PT, or the map cannot be used. Records then go on in
+// telemetry's base. Without telemetry a map that cannot be used throws CommandError.
 [[nodiscard]] std::unique_ptr<SceneLocalization> load_scene(const Config& config,
                                                             const NamedCalibration& calibration);
 

@@ -1,7 +1,7 @@
 #pragma once
 // StopSignals: SIGINT and SIGTERM as an event to wait for, so that a live command ends cleanly.
-// Construct it before any thread is started: threads inherit the blocked signals, and only wait()
-// sees them. After the first signal the second ends the process at once, as usual.
+// Construct it before starting any thread: threads inherit the blocked signals, and only wait()
+// sees them. After the first signal a second one ends the process at once, as usual.
 
 #include <signal.h>
 
@@ -15,7 +15,8 @@ class StopSignals {
   StopSignals& operator=(const StopSignals&) = delete;
 
   enum class Event { kSignal, kDescriptor, kTimeout };
-  // Waits for a signal, for `descriptor` to become readable, or for timeout_s to pass (infinity: for ever).
+  // Waits for a signal, for `descriptor` to become readable, or for timeout_s to pass (infinity:
+  // for ever).
   Event wait(int descriptor, double timeout_s);
 
  private:

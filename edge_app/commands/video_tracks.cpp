@@ -26,11 +26,11 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kPoints = 250;  // in a frame
-// Of a first trajectory's angles. It stands for measurements that OE mode weighs against what it sees, so
-// it claims no more than it must to predict the image.
+// px, sigma of the first trajectory's angles in the image. OE mode weighs these angles against what
+// it sees. So they are given only the accuracy that is needed to predict the image.
 constexpr double kFirstSigma_px = 1;
 
-// use(frame, luma) for each image of the input's frames, in the order of the recording.
+// Calls use(frame, image) for each image of the input's frames, in the order of the recording.
 template <class Use>
 void for_each_image(const std::string& directory, const CalibrationInput& input,
                     const VideoProgress& progress, std::vector<std::string>* remarks, Use use) {

@@ -1,13 +1,13 @@
 #pragma once
-// Keypoint tracks for a calibration, found in a recording's video.
+// Finds keypoint tracks for a calibration in a recording's video, and makes the map that belongs to
+// the resulting calibration.
 //   first pass   nothing is known of the camera: StartUpTracker
-//   second pass  with the camera, the clocks and the trajectory of a first calibration: OeMode, whose map
-//                recognises what the camera comes back to, so that tracks span the whole recording
-// And the map that belongs to the calibration that came of it.
-// Pixels as in CONVENTIONS.md; sigma_px is that of a component, sqrt(trace of covariance / 2), of what
-// differs between the observations of one landmark.
-// Reads the whole video; throws CommandError (no or unreadable images, or of another size than
-// recording.yaml says). Runs on the caller's thread.
+//   second pass  camera, clocks and trajectory of a first calibration are known: OeMode. Its map
+//                recognises what the camera returns to, so that tracks span the whole recording
+// Pixels as in CONVENTIONS.md. sigma_px is sqrt(trace of covariance / 2), that of one component; it
+// holds only what differs between the observations of one landmark. Reads the whole video on the
+// caller's thread. Throws CommandError if there are no images, if they are unreadable or too small,
+// or if recording.yaml states another size.
 
 #include <functional>
 #include <string>
@@ -21,24 +21,25 @@ namespace alidade {
 
 struct VideoTracks {
   std::vector<CalibrationObservation> observations;
-  UntrackedFrames without;           // frames without an observation, if they were looked for
+  UntrackedFrames without;           // searched frames without an observation
   std::vector<std::string> remarks;  // about the video, for the report
 };
 
 // Called for each frame with the part of the video that is done, 0 to 1.
 using VideoProgress = std::function<void(double done)>;
 
-// video.mkv or frames/.
+// Whether the recording has video.mkv or frames/.
 [[nodiscard]] bool has_video(const std::string& directory);
 
-// Of the input's frames; its observations are not looked at.
+// Finds tracks in the frames of `input`. Its observations are not used. With `estimate`: second
+// pass.
 [[nodiscard]] VideoTracks track_video(const std::string& directory, const CalibrationInput& input,
                                       const VideoProgress& progress);
 [[nodiscard]] VideoTracks track_video(const std::string& directory, const CalibrationInput& input,
                                       const CalibrationResult& estimate,
                                       const VideoProgress& progress);
 
-// Of up to kMaxKeyframes images, spread over the calibrated frames.
+// Makes the map from at most kMaxKeyframes images, spread evenly over the calibrated frames.
 inline constexpr std::size_t kMaxKeyframes = 24;
 [[nodiscard]] MapState map_video(const std::string& directory, const CalibrationResult& result,
                                  const VideoProgress& progress);

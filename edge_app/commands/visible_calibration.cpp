@@ -15,10 +15,10 @@
 namespace alidade {
 namespace {
 
-constexpr double kShareOfLooking = 0.9;  // of the time that tracks and adjustment take
+constexpr double kShareOfLooking = 0.9;  // share of finding tracks in the time with the adjustment
 
-// What is done on a terminal; the first SIGINT or SIGTERM cancels at the next step, the second ends the process
-// as usual.
+// Shows the progress on a terminal. The first SIGINT or SIGTERM cancels at the next step; the
+// second ends the process at once.
 class VisibleProgress {
  public:
   VisibleProgress(const std::string& name, StopSignals* signals) : name_(name), signals_(signals) {}
@@ -28,12 +28,12 @@ class VisibleProgress {
     if (show_) fmt::print(stderr, "\r\033[K");
   }
 
-  // What show() is told from now on is the part of the whole from `begin` to `end`.
+  // From now on show(0) is `begin` and show(1) is `end` of the whole, 0 to 1.
   void set_part(double begin, double end) {
     begin_ = begin;
     end_ = end;
   }
-  // False: cancelled.
+  // Returns false if the user cancelled.
   bool show(double done, const char* what) {
     const double percent = 100 * (begin_ + done * (end_ - begin_));
     if (show_) fmt::print(stderr, "\r\033[K{}: {:3.0f} % {}", name_, percent, what);
@@ -51,7 +51,7 @@ class VisibleProgress {
   double end_ = 1;
 };
 
-// `begin` of the part is done already.
+// begin: how much of the current part is done already, 0 to 1.
 KnownCameraCalibration calibrate_visibly(const CalibrationJob& job, double begin,
                                          VisibleProgress* progress) {
   CalibrationOptions options = job.options;
@@ -63,7 +63,8 @@ KnownCameraCalibration calibrate_visibly(const CalibrationJob& job, double begin
   return calibrated;
 }
 
-// Of what was found, as many as an adjustment takes, and which frames are then without.
+// Puts as many of the found tracks into the job as an adjustment can take, and notes the frames
+// that are left without one.
 void use_tracks(VideoTracks tracks, CalibrationJob* job, std::vector<std::string>* remarks) {
   UntrackedFrames found = std::move(tracks.without);
   const std::size_t before = without_shared_pixels(tracks.observations).size();
@@ -83,7 +84,7 @@ void use_tracks(VideoTracks tracks, CalibrationJob* job, std::vector<std::string
       job->input.observations.size(), before, kMaxObservations));
 }
 
-// Finds tracks, without or with a first estimate, and calibrates with them.
+// Finds tracks, with a first estimate unless `estimate` is null, and calibrates with them.
 KnownCameraCalibration calibrate_video(const std::string& recording,
                                        const CalibrationResult* estimate, CalibrationJob* job,
                                        std::vector<std::string>* remarks,
@@ -91,7 +92,7 @@ KnownCameraCalibration calibrate_video(const std::string& recording,
   const VideoProgress look = [progress, estimate](double done) {
     const char* what = estimate == nullptr ? "following points in the video"
                                            : "following points again, with the estimated camera";
-    // Looking at the video takes nearly all of the time.
+    // Finding tracks takes nearly all of the time.
     if (!progress->show(kShareOfLooking * done, what)) throw progress->cancelled();
   };
   VideoTracks tracks = estimate == nullptr ? track_video(recording, job->input, look)

@@ -1,6 +1,7 @@
 #pragma once
-// The minutes of `alidade calibrate`: tracks from the video, adjustment, map; shown on a terminal, and ended by SIGINT or
-// SIGTERM at the next step (CommandError), by the second one as usual.
+// The long parts of `alidade calibrate`: tracks from the video, adjustment, map. Progress is shown
+// on a terminal. SIGINT or SIGTERM ends the work at the next step (CommandError); a second signal
+// ends the process at once.
 
 #include <string>
 
@@ -11,15 +12,16 @@
 
 namespace alidade {
 
-// Finds tracks in the video, if the job has none, without and (passes 2) with a first estimate; calibrates with them.
-// Leaves observations, remarks and the options as used in *job.
+// Calibrates. If the job has no tracks, they are found in the video first; with passes 2 they are
+// then found again with the first estimate. Leaves observations, remarks and the options used in
+// *job.
 [[nodiscard]] CalibrationResult calibrate_job(const std::string& recording, int passes,
                                               CalibrationJob* job, StopSignals* signals);
 
-// Finds the tracks of the job's movement in the pictures that may hold some.
+// Finds the tracks of job->movement in job->movement_pictures.
 void track_movement(const std::string& recording, CalibrationJob* job, StopSignals* signals);
 
-// Of the recording's video.
+// map_video() with the progress shown.
 [[nodiscard]] MapState map_visibly(const std::string& recording, const CalibrationResult& result,
                                    StopSignals* signals);
 

@@ -259,7 +259,8 @@ OutputConfig read_output(YamlSection section, const std::string& path,
   return output;
 }
 
-// While the head rests, the newest angle that is known is max_repeat_s old (core/realtime, TelemetryBuffer).
+// While the head rests, the newest trusted angle is max_repeat_s old (core/realtime,
+// TelemetryBuffer).
 void check_ages(const Config& config, const YamlSection& pan_tilt, const YamlSection& realtime) {
   const double repeat_s = config.pan_tilt.max_repeat_s;
   const double extrapolation_s = config.realtime.max_extrapolation_s;
@@ -280,7 +281,7 @@ void check_ages(const Config& config, const YamlSection& pan_tilt, const YamlSec
                   extrapolation_s, repeat_s, why, repeat_s, right_repeat));
 }
 
-// Without telemetry the scene map tells where the camera looks, through the lens of a calibration.
+// Without telemetry the scene map gives the orientation. For that it needs a calibrated lens.
 void check_without_telemetry(const Config& config, const YamlSection& pan_tilt,
                              const YamlSection& calibration, const YamlSection& realtime) {
   if (config.scene_map.file.empty()) {
@@ -307,7 +308,7 @@ void check_without_telemetry(const Config& config, const YamlSection& pan_tilt,
   }
 }
 
-// What goes with what, beyond single sections.
+// Rules that span several sections.
 void check_together(const Config& config, const YamlSection& calibration,
                     const YamlSection& scene_map, const std::string& path,
                     std::vector<std::string>* warnings) {
@@ -336,7 +337,7 @@ void check_together(const Config& config, const YamlSection& calibration,
   }
 }
 
-// What detectors find becomes targets, and they look at frames in OE mode.
+// Detectors need `tracking`, as their boxes become targets. They look only at frames in OE mode.
 void check_detectors(const Config& config, const YamlSection& detectors) {
   if (!config.detectors.any()) return;
   const char* first = config.detectors.motion   ? "motion"
@@ -353,7 +354,7 @@ void check_detectors(const Config& config, const YamlSection& detectors) {
   }
 }
 
-// Detections come over HTTP, or of detectors here.
+// Detections come over HTTP or from the built-in detectors.
 void check_targets(const Config& config, const YamlSection& output) {
   if (!config.output.targets.empty() && !config.tracking.targets)
     output.fail("targets", "stands without section tracking; add tracking");
@@ -373,7 +374,7 @@ void read_config(YamlSection& top, const std::string& path, ConfigScope scope, C
   const YamlSection detectors = top.section("detectors");
   const YamlSection mqtt = top.section("mqtt");
   const YamlSection output = top.section("output");
-  // Before one is missed: it may be there, mistyped.
+  // Look for unknown sections first: one that seems missing may be there, mistyped.
   top.finish();
   for (const char* required : {"video", "pan_tilt"}) {
     const bool is_needed = scope == ConfigScope::kAll ||

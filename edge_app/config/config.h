@@ -1,10 +1,11 @@
 #pragma once
 // The configuration of `alidade`: one YAML file, strictly checked (yaml_section.h).
 //
-// Every value carries its unit here as in the file. What the file leaves out has the default below;
-// what has no default (types, addresses) is required. Passwords stand in the environment, never in
-// the file: `password_env` names the variable. Relative paths are relative to the file's folder.
-// Reading touches nothing but the file and the environment: no connection is tried.
+// Each value has the same unit here as in the file. A key that the file leaves out takes the
+// default below. A key without a default (types, addresses) is required. Passwords stand in the
+// environment, never in the file: `password_env` names the variable. Relative paths start at the
+// file's folder. Reading touches this file, the environment, and the files of secrets and
+// certificates that the file names. It tries no connection.
 
 #include <optional>
 #include <string>
@@ -25,71 +26,72 @@ struct VideoConfig {
   enum class Type { kRtsp, kRtp, kMjpeg, kV4l2, kRecording };
   enum class Transport { kTcp, kUdp };
   Type type = Type::kRtsp;
-  std::string
-      url;  // rtsp: rtsp://... or rtsps://...; mjpeg: http://...; rtp: an .sdp file or rtp://address:port
-  std::string format = "MJPG";             // rtp://address:port: MJPG, H264 or H265
+  // rtsp: rtsp://... or rtsps://...; mjpeg: http(s)://...; rtp: an .sdp file or rtp://address:port.
+  std::string url;
+  std::string format = "MJPG";             // of rtp://address:port: MJPG, H264 or H265
   std::string directory;                   // recording
   std::string device;                      // v4l2: /dev/video0
   std::optional<V4l2Format> pixel_format;  // v4l2; empty: the first that fits
   double rate_hz = 0;                      // v4l2; 0: the device's own
-  int width = 0;                           // px, what live video must have; 0: whatever comes
-  int height = 0;                          // px
+  int width = 0;                           // px, required of live video; 0: any
+  int height = 0;                          // px, likewise
   std::string user;                        // rtsp, mjpeg
   std::string password;
   LinkRules rules;                        // rtsp, mjpeg
   Transport transport = Transport::kTcp;  // rtsp
   std::string certificate_file;           // rtsps://; empty: the system's
-  double timeout_s = 3;                   // silence that counts as a loss
-  double max_backoff_s = 5;               // longest pause between two attempts
+  double timeout_s = 3;                   // s without a picture; then the camera counts as lost
+  double max_backoff_s = 5;               // s, longest pause between two attempts to connect
 };
 
-// Of a lens that zooms: at both ends of its range.
+// The focal lengths of a zoom lens at both ends of its range.
 struct FocalLengthRange {
   double wide_px = 0;
-  double tele_px = 0;  // more than that
+  double tele_px = 0;  // greater than wide_px
 };
 
-// The data sheet's camera: used as long as there is no calibration.
+// The camera as the data sheet has it. It is used as long as there is no calibration.
 struct CameraConfig {
-  // Where it zooms the one in the middle, in octaves.
+  // For a zoom lens: the geometric mean of wide_px and tele_px.
   std::optional<double> focal_length_px;
   std::optional<FocalLengthRange> focal_length_range;
   double aspect = 1;
   double radial_distortion = 0;
-  double line_delay_s = 0;  // of the sensor read top to bottom
-  bool upside_down =
-      false;  // mounted upside down, image turned by 180 degrees: negates line_delay_s
+  double line_delay_s = 0;  // s/row, of the sensor read from top to bottom
+  // The camera hangs upside down and turns its image by 180 degrees; negates line_delay_s.
+  bool upside_down = false;
 };
 
 struct CalibrationConfig {
   std::string file;   // empty: none
   std::string prior;  // a lens.yaml; empty: none
-  // Live only: calibrate while the camera moves, and store the result in file.
+  // For live video only: calibrate while the camera moves, and store the result in `file`.
   bool automatic = true;
-  // Device units within which two zoom readings are one; none: as their jitter shows (steady_zoom.h).
+  // Device units; two zoom readings that differ by no more are one zoom. Empty: found from their
+  // jitter (steady_zoom.h).
   std::optional<double> zoom_tolerance;
 };
 
 struct SceneMapConfig {
   std::string file;                // a scene.map; empty: none
-  double interval_s = 10;          // from one localization to the next, while nothing calls for one
-  double zero_sigma_rad = 1e-3;    // of telemetry's zero from one start to the next
-  bool correct_moved_base = true;  // false: a movement is reported only
-  bool update = false;             // the file is kept up by the pictures that are found in it
+  double interval_s = 10;          // s between two localizations when nothing asks for one sooner
+  double zero_sigma_rad = 1e-3;    // rad, of telemetry's zero from one start to the next
+  bool correct_moved_base = true;  // false: a movement is only reported
+  bool update = false;             // pictures that are found in the map keep the file up to date
 };
 
 struct RealtimeConfig {
-  bool landmarks = true;  // mode OE; false: PT, and nothing is calibrated
-  int priority = 0;       // SCHED_FIFO priority, see priority_of(); 0 leaves the scheduler alone
+  bool landmarks = true;  // true: mode OE; false: mode PT, nothing is calibrated
+  int priority = 0;       // SCHED_FIFO priority, see priority_of(); 0: normal scheduling
   int cpu = -1;           // -1: any
   bool lock_memory = false;
-  double max_extrapolation_s = 0.25;  // how far beyond the newest trusted angle one is stated
+  double max_extrapolation_s = 0.25;  // s beyond the newest trusted angle
 };
 
 struct OutputConfig {
   std::optional<OutputFormat> stdout_format = OutputFormat::kJson;  // empty: nothing on stdout
   std::optional<HttpServerOptions> http;                            // empty: no server
-  std::string targets;  // JSON Lines of targets are appended to this file; empty: to none
+  std::string targets;  // file to which targets are appended as JSON Lines; empty: none
 };
 
 struct Config {
@@ -102,19 +104,20 @@ struct Config {
   TrackingConfig tracking;
   BuiltInDetectorOptions detectors;
   OutputConfig output;
-  std::optional<MqttOptions> mqtt;    // empty: no broker is told
-  std::vector<std::string> warnings;  // FILE:LINE: ... lines for the log
+  std::optional<MqttOptions> mqtt;    // empty: no broker
+  std::vector<std::string> warnings;  // lines for the log: FILE:LINE: ...
 };
 
-// What must be there. What is there is checked either way.
+// Which of the sections `video` and `pan_tilt` are required. Every section that the file has is
+// checked in any case.
 enum class ConfigScope {
-  kAll,
-  kVideo,    // a camera without a head, as on a bench; of the result, the video
-  kTracking  // neither need be there; of the result, the tracking
+  kAll,      // both
+  kVideo,    // `video`: a camera without a head, as on a bench. Use only config.video
+  kTracking  // neither. Use only config.tracking
 };
 
-// path stands for the file in errors, and is where relative paths start.
-// False with a line "FILE[:LINE]: KEY: what is wrong; what would be right" in *error.
+// `path` names the file in errors; relative paths start at its folder. On failure returns false
+// with one line in *error: "FILE[:LINE]: KEY: what is wrong; what would be right".
 [[nodiscard]] bool parse_config(const std::string& text, const std::string& path, Config* config,
                                 std::string* error, ConfigScope scope = ConfigScope::kAll);
 [[nodiscard]] bool load_config(const std::string& path, Config* config, std::string* error,

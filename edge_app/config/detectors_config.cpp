@@ -7,7 +7,7 @@
 namespace alidade {
 namespace {
 
-// Two keys of which the second is not to be below the first.
+// Reads two keys; the second must not be below the first.
 void read_sizes(YamlSection& section, const char* least_key, const char* most_key,
                 const NumberRange& range, double* least, double* most) {
   *least = section.number(least_key, range).value_or(*least);

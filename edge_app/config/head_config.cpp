@@ -44,7 +44,7 @@ ByteLinkOptions read_link(YamlSection& section, const std::string& config_path) 
   return link;
 }
 
-// positive, negative: the words for the two ways an axis can count.
+// positive, negative: the words for the two directions in which an axis can count.
 AxisMapping read_axis(YamlSection& section, const std::string& axis, const std::string& positive,
                       const std::string& negative, const std::optional<double>& usual_sign) {
   AxisMapping mapping;

@@ -1,7 +1,8 @@
 #pragma once
-// The part of section pan_tilt that describes a head on a serial line, TCP or UDP: protocol, line, and
-// what the device counts. Nothing about the head is guessed: where makers differ (degrees per step,
-// which way counts as positive) a key is required; what a protocol or the device itself says is the default.
+// The part of section `pan_tilt` that describes a head on a serial line, TCP or UDP: the protocol,
+// the line, and how the device counts. Nothing about the head is guessed. Where makers differ
+// (degrees per step, sign) a key is required. Where the protocol or the device defines a value,
+// that value is the default.
 
 #include <string>
 
@@ -16,16 +17,16 @@ struct HeadConfig {
   ByteLinkOptions link;
 };
 
-// Sections' keys pan_positive, pan_zero_deg, tilt_positive, tilt_zero_deg. Which way counts as positive is
-// required where `usual` does not say it. Throws ConfigError.
+// The keys pan_positive, pan_zero_deg, tilt_positive and tilt_zero_deg. pan_positive and
+// tilt_positive are required where `usual` has no sign. Throws ConfigError.
 struct AxisMappings {
   AxisMapping pan;
   AxisMapping tilt;
 };
 AxisMappings read_axes(YamlSection& section, const UsualSigns& usual);
 
-// *rate_hz: the default; then what is configured, or the default as far as the line carries it. Throws
-// ConfigError.
+// *rate_hz: in, the default; out, the configured rate, or else the default, limited to what the
+// line can carry. A configured rate beyond that is an error. Throws ConfigError.
 HeadConfig read_head(YamlSection& section, HeadType type, const std::string& config_path,
                      double* rate_hz);
 

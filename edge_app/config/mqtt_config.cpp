@@ -21,7 +21,7 @@ void read_broker(YamlSection& section, MqttOptions* mqtt) {
     section.fail("url", "has a path, which a broker has none of; see mqtt.prefix for topics");
   mqtt->tls = url.scheme == "mqtts";
   mqtt->host = url.host;
-  // Of IPv6.
+  // An IPv6 address stands in brackets.
   if (mqtt->host.size() > 2 && mqtt->host.front() == '[')
     mqtt->host = mqtt->host.substr(1, mqtt->host.size() - 2);
   constexpr int kPort = 1883;

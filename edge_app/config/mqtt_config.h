@@ -1,10 +1,12 @@
 #pragma once
-// Section `mqtt`: the broker that is told status, targets and orientation (edge_app/output/mqtt_publisher.h).
-//   url: mqtt://broker:1883, or mqtts://broker:8883 with TLS              (required; the port may be left out)
-//   ca_file, certificate_file, key_file                                   PEM; mqtts only
+// Section `mqtt`: the broker to which status, targets and orientation are published
+// (edge_app/output/mqtt_publisher.h).
+//   url                                   required: mqtt://broker:1883, or with TLS
+//                                         mqtts://broker:8883; the port may be left out
+//   ca_file, certificate_file, key_file   PEM; only with mqtts
 //   user, password_env | password_file
 //   prefix, client_id, qos, keep_alive_s, timeout_s, max_backoff_s, orientation_rate_hz
-// What each means, and its default: mqtt_options.h.
+// Meanings and defaults: mqtt_options.h.
 
 #include <string>
 #include <vector>

@@ -5,7 +5,7 @@
 namespace alidade {
 namespace {
 
-// Damerau and Levenshtein's distance, no letter touched twice ("optimal string alignment").
+// Damerau-Levenshtein distance in which no letter is edited twice ("optimal string alignment").
 std::size_t slips_between(const std::string& a, const std::string& b) {
   std::vector<std::vector<std::size_t>> slips(a.size() + 1, std::vector<std::size_t>(b.size() + 1));
   for (std::size_t i = 0; i <= a.size(); ++i) slips[i][0] = i;
@@ -32,7 +32,7 @@ std::optional<std::string> nearest_word(const std::string& typed,
   for (const std::string& word : known) {
     const std::size_t longer = std::max(typed.size(), word.size());
     const std::size_t shorter = std::min(typed.size(), word.size());
-    // Too different in length; a long text of no word costs nothing.
+    // The lengths alone differ too much. This skips the quadratic work for a long text.
     if (kLettersOfASlip * (longer - shorter) > longer) continue;
     const std::size_t slips = slips_between(typed, word);
     if (kLettersOfASlip * slips > longer || (nearest && slips >= fewest)) continue;

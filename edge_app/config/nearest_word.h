@@ -1,6 +1,6 @@
 #pragma once
-// The word that somebody meant who mistyped it: for "did you mean" in the configuration and on the command line.
-// Pure; allocates.
+// Finds the word that was probably meant by a mistyped one, for "did you mean" in the configuration
+// and on the command line. Pure; allocates.
 
 #include <optional>
 #include <string>
@@ -8,8 +8,9 @@
 
 namespace alidade {
 
-// The one of `known` that is fewest slips away from `typed`: a letter left out, added, replaced, or exchanged with its
-// neighbour. The first of those as near; none where it takes more than one slip in three letters.
+// The word of `known` with the fewest slips from `typed`. A slip is a letter left out, added,
+// replaced, or exchanged with its neighbour. Of equally near words the first is taken. Empty if
+// each word needs more than one slip in three letters of the longer of the two words.
 [[nodiscard]] std::optional<std::string> nearest_word(const std::string& typed,
                                                       const std::vector<std::string>& known);
 

@@ -1,7 +1,7 @@
 #pragma once
-// noise.yaml of a recording: what is known about the noise of its streams. Everything is optional,
-// the file too. A stamp sigma says that the stamps scatter to both sides of the true time (symmetric
-// jitter); without it they are taken to be late only, as those of a live stream are.
+// noise.yaml of a recording: the noise of its streams. Every key is optional, and so is the file. A
+// stamp sigma says that the time stamps scatter to both sides of the true time (symmetric jitter).
+// Without it they are assumed to be late only, as those of a live stream are.
 
 #include <optional>
 #include <string>
@@ -14,11 +14,11 @@ struct RecordingNoise : CalibrationNoise {
   std::optional<double> pan_tilt_scale_sigma;  // prior of both scales
 };
 
-// Pure: text in, noise or one line of error out. name stands for the file in errors.
+// Pure. False with one line in *error. `name` names the file in errors.
 [[nodiscard]] bool parse_noise(const std::string& text, const std::string& name,
                                RecordingNoise* noise, std::string* error);
 
-// False with a line FILE:LINE: ... in *error if directory/noise.yaml is there and malformed.
+// False with one line FILE:LINE: ... in *error if directory/noise.yaml exists and is malformed.
 [[nodiscard]] bool load_noise(const std::string& directory, RecordingNoise* noise,
                               std::string* error);
 

@@ -10,12 +10,12 @@ namespace {
 
 constexpr NumberRange kAngle{0, 0.1, "rad"};
 
-// Without blanks, too.
+// Printable ASCII without blanks.
 bool is_printable(const std::string& text) {
   return std::all_of(text.begin(), text.end(), [](char c) { return c > ' ' && c < '\x7F'; });
 }
 
-// /path or :8080/path.
+// "/path" or ":8080/path".
 bool is_path_of_a_service(const std::string& text) {
   const std::size_t path = text.find('/');
   if (path == std::string::npos) return false;
@@ -24,7 +24,7 @@ bool is_path_of_a_service(const std::string& text) {
                           port.find_first_not_of("0123456789", 1) == std::string::npos);
 }
 
-// The angles at both ends of a device's own scale, of which none may be the other.
+// The angles at both ends of the device's scale. They must differ.
 std::optional<std::array<double, 2>> read_range(YamlSection& section, const std::string& key) {
   const auto ends = section.numbers(key, 2, {-360, 360, "deg"});
   if (!ends) return std::nullopt;
@@ -34,7 +34,7 @@ std::optional<std::array<double, 2>> read_range(YamlSection& section, const std:
   return std::array<double, 2>{ends->front(), ends->back()};
 }
 
-// What a device tells at these ends, likewise.
+// The positions that the device reports at these ends. They must differ.
 std::optional<std::array<double, 2>> read_scale(YamlSection& section, const std::string& key) {
   const auto ends = section.numbers(key, 2, {-1e6, 1e6, "of the device's own scale"});
   if (!ends) return std::nullopt;
@@ -70,14 +70,14 @@ void read_onvif(YamlSection& section, PanTiltConfig* pan_tilt) {
                  "must be a path like /onvif/ptz_service, or with a port of its own like "
                  "':8080/onvif/ptz_service'; the host is that of url");
   }
-  pan_tilt->rate_hz = 10;  // SOAP is work for a camera
+  pan_tilt->rate_hz = 10;  // a SOAP request costs a camera much time
 }
 
 // A value of pan_tilt.type.
 struct PanTiltType {
   std::string key;
   PanTiltConfig::Type type;
-  std::optional<HeadType> head;  // of kHead
+  std::optional<HeadType> head;  // only for kHead
 };
 
 std::vector<PanTiltType> pan_tilt_types() {
@@ -100,14 +100,14 @@ PanTiltType read_pan_tilt_type(YamlSection& section) {
                        [&](const PanTiltType& type) { return type.key == *key; });
 }
 
-// What all devices have that are asked over HTTP.
+// The keys of all devices that are polled over HTTP.
 void read_http_device(YamlSection& section, PanTiltConfig* pan_tilt) {
   pan_tilt->url = required_url(section, "http://camera", {"http://", "https://"});
   read_login(section, &pan_tilt->user, &pan_tilt->password);
   pan_tilt->rules = read_link_rules(section);
 }
 
-// The keys of the type alone.
+// The keys that belong to one type only.
 void read_device(YamlSection& section, const PanTiltType& type, const std::string& path,
                  PanTiltConfig* pan_tilt) {
   constexpr NumberRange kRate{0.1, 1000, "Hz"};
@@ -146,7 +146,7 @@ PanTiltConfig read_pan_tilt(YamlSection section, const std::string& path) {
   pan_tilt.type = type.type;
   read_device(section, type, path, &pan_tilt);
   if (type.type == PanTiltConfig::Type::kNone) {
-    section.finish();  // nothing is asked, so nothing else is known
+    section.finish();  // no telemetry: all other keys are unknown
     return pan_tilt;
   }
   if (type.type != PanTiltConfig::Type::kRecording) {

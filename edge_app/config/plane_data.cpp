@@ -20,13 +20,14 @@ constexpr NumberRange kSigmaMetres{1e-6, 1e6, "m"};
 constexpr NumberRange kTurnDegrees{-360, 360, "degrees"};
 constexpr NumberRange kSigmaDegrees{1e-6, 90, "degrees"};
 
-// A picture that pixels are of.
+// A picture whose pixels are used as sights.
 struct NamedPicture {
   Camera<double> camera;
   double focal_length_sigma_px = 0;
   double line_delay_s = 0;
   FrameMotion<double> motion;
-  Matrix3<double> R_base_from_nominal;  // the record's orientation against that of nominal axes
+  // The record's orientation times the inverse of the orientation that nominal axes give.
+  Matrix3<double> R_base_from_nominal;
   int look = 0;
 };
 
@@ -113,7 +114,8 @@ class PlaneDataReader {
     return {latitude * kRadiansPerDegree, longitude * kRadiansPerDegree, height_m};
   }
 
-  // with_height: also how high it is, 0 where metres do not say.
+  // with_height: z is read, too; in metres (z_m) it defaults to 0. Otherwise the place is on the
+  // plane.
   Vector3<double> place_of(YamlSection& section, bool with_height) {
     if (section.has("latitude_deg") || section.has("longitude_deg")) {
       if (!frame_) {
@@ -243,7 +245,7 @@ class PlaneDataReader {
     }
   }
 
-  // Records have many fields more.
+  // Does not call finish(): a record has many more fields.
   NamedPicture read_record(YamlSection record) {
     const std::string needed = "a record with an orientation is needed";
     const NumberRange any{-1e9, 1e9, "1"};

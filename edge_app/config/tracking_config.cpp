@@ -7,7 +7,7 @@
 namespace alidade {
 namespace {
 
-// What has the unit of the space in its key's name.
+// The keys whose names end with a unit of the space.
 struct SpaceKeys {
   const char* acceleration_density;
   const char* first_velocity_sigma;
@@ -88,7 +88,7 @@ TrackingConfig read_tracking(YamlSection section, bool is_there, const std::stri
       section.number("lose_after_s", {0.01, 600, "s"}).value_or(tracker.lose_after_s);
   tracker.forget_after_s =
       section.number("forget_after_s", {0.01, 86400, "s"}).value_or(tracker.forget_after_s);
-  // Records are kept for ten seconds.
+  // At most 9 s, as records are kept for 10 s.
   tracker.history_s = section.number("history_s", {0, 9, "s"}).value_or(tracker.history_s);
   tracker.history_frames =
       section.integer("history_frames", {1, 500, "frames"}).value_or(tracker.history_frames);

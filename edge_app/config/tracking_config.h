@@ -1,15 +1,15 @@
 #pragma once
-// Section `tracking`: the ground under the camera, and how targets are made from detections. The section makes `run` track: on the plane
-// where one is given, else on the sphere.
-//   plane: plane.yaml                      of alidade plane fit
-//   space: plane | sphere                  sphere: also where a plane is given, for what flies
-//   detection_sigma_px, false_alarms_per_frame, detection_probability, least_score        the detector
-//   acceleration_density_m2_s3, first_velocity_sigma_m_s, most_sigma_m                    targets on the plane, or
-//   acceleration_density_rad2_s3, first_velocity_sigma_rad_s, most_sigma_rad              on the sphere
+// Section `tracking`: the ground under the camera, and how detections become targets. If the
+// section is there, `run` tracks: on the plane if one is given, otherwise on the sphere.
+//   plane: plane.yaml                  written by alidade plane fit
+//   space: plane | sphere              sphere despite a plane: for targets that fly
+//   Detector: detection_sigma_px, false_alarms_per_frame, detection_probability, least_score
+//   On the plane: acceleration_density_m2_s3, first_velocity_sigma_m_s, most_sigma_m
+//   On the sphere: acceleration_density_rad2_s3, first_velocity_sigma_rad_s, most_sigma_rad
 //   association: exact | cheap | nearest
 //   birth_hits, birth_looks, lose_after_s, forget_after_s
 //   history_s, history_frames, max_targets, max_detections
-// What each means, and its default: target_options.h, target_tracker.h.
+// Meanings and defaults: target_options.h, target_tracker.h.
 
 #include <optional>
 #include <string>
@@ -21,7 +21,7 @@ namespace alidade {
 
 struct TrackingConfig {
   std::string plane;                     // a plane.yaml; empty: none
-  std::optional<TargetOptions> targets;  // empty: there is no such section
+  std::optional<TargetOptions> targets;  // empty: the file has no section `tracking`
 };
 
 // is_there: whether the file has the section. Throws ConfigError.

@@ -48,7 +48,7 @@ void read_values(YamlSection& top, CalibrationValues* values) {
   values->tilt_scale = stated_value(top, "tilt_scale", {0.5, 2, "1"});
   values->pan_axis = axis(top, "pan_axis");
   values->tilt_axis = axis(top, "tilt_axis");
-  // Remarks of another program on its own run.
+  // Another program's notes on its own run: accepted, not used.
   static_cast<void>(top.number("cpu_s", {0, 1e9, "s"}));
   static_cast<void>(top.number("mean_pixel_error_px", {0, 1e9, "px"}));
   top.finish();

@@ -1,8 +1,9 @@
 #pragma once
-// Values of a calibration's parameters that are no calibration: guess.yaml, truth.yaml, peer.yaml and
-// limit.yaml of a recording. Names as in calibration.yaml, each {value, sigma} with sigma optional;
-// everything may be missing, the file too. Unknown names and what is no number are errors.
-// truth, guess, peer may also have format and image, as a calibration.yaml has.
+// Stated values of calibration parameters: guess.yaml, truth.yaml, peer.yaml and limit.yaml of a
+// recording. The names are those of calibration.yaml, each with {value, sigma}; sigma is optional.
+// In limit.yaml each is one number. Any name may be missing, and so may the file. Unknown names and
+// values that are not numbers are errors. truth, guess and peer may also have `format` and `image`,
+// as calibration.yaml has.
 
 #include <optional>
 #include <string>
@@ -16,7 +17,7 @@ struct StatedValue {
   std::optional<double> sigma;
 };
 
-// Units as in calibration.yaml.
+// Units: those of calibration.yaml.
 struct CalibrationValues {
   std::optional<StatedValue> focal_length;
   std::optional<StatedValue> aspect;
@@ -25,8 +26,8 @@ struct CalibrationValues {
   std::optional<StatedValue> clock_offset;
   std::optional<StatedValue> pan_scale;
   std::optional<StatedValue> tilt_scale;
-  std::optional<Vector3<double>> pan_axis;  // unit
-  std::optional<Vector3<double>> tilt_axis;
+  std::optional<Vector3<double>> pan_axis;   // unit vector
+  std::optional<Vector3<double>> tilt_axis;  // unit vector
 };
 
 // One standard deviation of the best possible estimate.
@@ -37,13 +38,14 @@ struct CalibrationLimits {
   std::optional<double> line_delay_s;
 };
 
-// Pure: text in, values or one line of error out. name stands for the file in errors.
+// Pure. False with one line in *error. `name` names the file in errors.
 [[nodiscard]] bool parse_values(const std::string& text, const std::string& name,
                                 CalibrationValues* values, std::string* error);
 [[nodiscard]] bool parse_limits(const std::string& text, const std::string& name,
                                 CalibrationLimits* limits, std::string* error);
 
-// False with a line FILE:LINE: ... in *error if the file is there and malformed. No file: all empty.
+// False with one line FILE:LINE: ... in *error if the file exists and is malformed. Without a file
+// all values are empty.
 [[nodiscard]] bool load_values(const std::string& path, CalibrationValues* values,
                                std::string* error);
 [[nodiscard]] bool load_limits(const std::string& path, CalibrationLimits* limits,

@@ -80,7 +80,7 @@ bool YamlSection::is_section(const std::string& key) const {
 }
 
 std::string YamlSection::where(const std::string& key) const {
-  // The key's line: an empty value has no place of its own.
+  // Take the line of the key: an empty value has no line of its own.
   std::string at = place(file_, node_);
   for (const auto& entry : node_) {
     if (entry.first.Scalar() == key) at = place(file_, entry.first);
@@ -113,7 +113,7 @@ std::optional<std::string> YamlSection::scalar(const std::string& key, const std
   if (!value) return std::nullopt;
   if (value->IsNull()) fail(key, "has no value; expected " + expected);
   if (!value->IsScalar()) fail(key, "expected " + expected + ", not a list or mapping");
-  // yaml-cpp tags quoted scalars "!" and plain ones "?".
+  // yaml-cpp tags quoted scalars "!" and plain scalars "?".
   if (plain && value->Tag() == "!") {
     fail(key, fmt::format("'{}' is quoted text; expected {}", value->Scalar(), expected));
   }

@@ -1,12 +1,12 @@
 #pragma once
-// One mapping of a YAML configuration, read strictly (core/calibration/strict_yaml.h), and asked for its values.
+// One mapping of a YAML configuration, read strictly (core/calibration/strict_yaml.h).
 //
-// Each reader (text, number, ...) takes the key's value out and checks its type and range; finish()
-// then rejects every key that no reader asked for. All complaints are ConfigError with one line
+// Each reader (text, number, ...) returns the value of a key and checks its type and range.
+// finish() then rejects every key that no reader asked for. A failure throws ConfigError, one line:
 //     FILE:LINE: SECTION.KEY: what is wrong; what would be right
-// An absent key is an empty optional; a key without a value is an error. Numbers are plain (a
-// unit belongs to the key's name); quoted numbers and words such as "yes" for a truth value are
-// errors, as they hide slips.
+// An absent key gives an empty optional. A key without a value is an error. A number is plain: its
+// unit belongs to the key's name. Quoted numbers, and words such as "yes" for a truth value, are
+// errors, as they hide mistakes.
 
 #include <yaml-cpp/yaml.h>
 
@@ -21,7 +21,7 @@ namespace alidade {
 
 using ConfigError = YamlError;
 
-// Inclusive limits of a number and its unit for the message ("px", "s", "1").
+// Inclusive limits of a number, and its unit for messages ("px", "s", "1").
 struct NumberRange {
   double low;
   double high;
@@ -42,28 +42,28 @@ class YamlSection {
                                              const NumberRange& range);
   std::optional<int> integer(const std::string& key, const NumberRange& range);
   std::optional<bool> truth(const std::string& key);
-  // One of `available`; a word of `planned` is refused as not available in this version.
+  // One of `available`. A word of `planned` is refused as not available in this version.
   std::optional<std::string> choice(const std::string& key,
                                     const std::vector<std::string>& available,
                                     const std::vector<std::string>& planned = {});
-  // A section inside this one; an empty one if the key is absent.
+  // A section inside this one; empty if the key is absent.
   YamlSection section(const std::string& key);
-  // A list of sections, named KEY[0] and so on; none if the key is absent.
+  // A list of sections, named KEY[0] and so on; empty if the key is absent.
   std::vector<YamlSection> sections(const std::string& key);
 
-  // Throws if a key is left that no reader asked for.
+  // Throws if there is a key that no reader asked for.
   void finish() const;
 
-  // "FILE:LINE: SECTION.KEY", of the section itself if it lacks the key.
+  // "FILE:LINE: SECTION.KEY". If the key is absent, the line is the section's.
   [[nodiscard]] std::string where(const std::string& key) const;
   [[noreturn]] void fail(const std::string& key, const std::string& what) const;
-  // For a key that there must be: "is missing; EXPECTED". Where it was only mistyped, that is what is said.
+  // For a required key: "is missing; EXPECTED". If it was mistyped, the message names that key.
   [[noreturn]] void fail_missing(const std::string& key, const std::string& expected) const;
 
  private:
   [[nodiscard]] std::optional<YAML::Node> find(const std::string& key) const;
   [[nodiscard]] std::string path_of(const std::string& key) const;  // SECTION.KEY
-  // The value as a scalar's text. `expected` completes "expected ...".
+  // The value as text. `expected` completes "expected ...". `plain`: quoted text is refused.
   std::optional<std::string> scalar(const std::string& key, const std::string& expected,
                                     bool plain);
 
@@ -73,12 +73,12 @@ class YamlSection {
   std::vector<std::string> asked_;
 };
 
-// Hands the top section of a YAML text to `read`, which may throw ConfigError. False with one line in
-// *error if it is not YAML, or `read` threw. name stands for the file in errors.
+// Hands the top section of a YAML text to `read`, which may throw ConfigError. False with one line
+// in *error if the text is not YAML or `read` threw. `name` names the file in errors.
 [[nodiscard]] bool parse_yaml(const std::string& text, const std::string& name,
                               const std::function<void(YamlSection&)>& read, std::string* error);
 
-// The same for a file; one that cannot be read is an error, too.
+// The same for a file. A file that cannot be read is an error, too.
 [[nodiscard]] bool read_yaml_file(const std::string& path,
                                   const std::function<void(YamlSection&)>& read,
                                   std::string* error);

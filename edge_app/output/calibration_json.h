@@ -11,10 +11,11 @@ namespace alidade {
 // Each parameter as name: {value, sigma}.
 nlohmann::ordered_json parameters_json(const Calibration& calibration);
 
-// All of the file but for what it tells of the run that wrote it.
+// All of calibration.yaml except the notes on the run that wrote it.
 nlohmann::ordered_json calibration_json(const Calibration& calibration);
 
-// What people want to see of a curve that is not empty: its nodes, and the focal length from the first to the last.
+// A zoom curve, not empty: its nodes at dwells, and samples of the focal length from the first to
+// the last reading.
 nlohmann::ordered_json zoom_curve_json(const ZoomCurve& curve);
 
 }  // namespace alidade

@@ -43,7 +43,7 @@ SummaryRow axis_row(const Calibration& calibration, const char* name, const Vect
                           : std::string("nominal, exact")};
 }
 
-// In characters, not bytes: a prior has a plus-minus sign.
+// Counts characters, not bytes: a prior has a plus-minus sign.
 std::size_t width_of(const std::string& text) {
   return static_cast<std::size_t>(std::count_if(text.begin(), text.end(), [](char c) {
     return (static_cast<unsigned char>(c) & 0xc0) != 0x80;
@@ -140,7 +140,7 @@ std::string summary_json(const CalibrationResult& result, const CalibrationOptio
   json["excluded"] = result.exclusions.describe();
   json["files"] = ordered_json::object();
   for (const auto& [kind, path] : files) json["files"][kind] = path;
-  // A folder's name may be no UTF-8.
+  // A folder name need not be UTF-8.
   return json.dump(-1, ' ', false, ordered_json::error_handler_t::replace) + "\n";
 }
 

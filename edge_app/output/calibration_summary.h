@@ -1,7 +1,7 @@
 #pragma once
-// The result of a calibration in short: as rows for a person, and as JSON for a program.
-// People get the units of data sheets (ms, us, mrad), with as many digits as the sigma bears; JSON has the
-// names, units and bits of calibration.yaml. Pure; allocates.
+// A summary of a calibration: as a table for people and as JSON for programs. The table has the
+// units of data sheets (ms, us, mrad), with as many digits as the sigma allows. JSON has the names,
+// units and bits of calibration.yaml. Pure; allocates.
 
 #include <string>
 #include <utility>
@@ -19,18 +19,20 @@ struct SummaryRow {
   std::string prior;
 };
 
-// One for each parameter; an axis is one.
+// One row for each parameter; an axis has one row.
 std::vector<SummaryRow> summary_rows(const CalibrationResult& result,
                                      const CalibrationOptions& options);
 
-// Aligned columns, the verdict, what was left out, and the advice. Lines end with a line feed.
+// The table in aligned columns, the verdict, what was left out, and advice. Each line ends with a
+// line feed.
 std::string summary_text(const CalibrationResult& result, const CalibrationOptions& options);
 
-// One line. files: what was written, by kind.
+// One line. files: kind and path of each file that was written.
 std::string summary_json(const CalibrationResult& result, const CalibrationOptions& options,
                          const std::vector<std::pair<std::string, std::string>>& files);
 
-// The priors that were used, by the names of Parameter; an axis's are changes from nominal, in rad.
+// The priors that were used, by the names of Parameter. Those of an axis are changes from nominal,
+// rad.
 std::vector<std::pair<std::string, CalibrationPrior>> stated_priors(
     const CalibrationOptions& options);
 

@@ -1,5 +1,5 @@
 #pragma once
-// The host's clock and the wall clock at one instant.
+// The host's clock and the wall clock, read at the same time.
 
 #include <limits>
 #include <nlohmann/json_fwd.hpp>
@@ -7,9 +7,10 @@
 namespace alidade {
 
 struct ClockPair {
-  double monotonic_s = 0;                                      // CLOCK_MONOTONIC
-  double wall_s = 0;                                           // CLOCK_REALTIME: since 1970
-  double bracket_s = std::numeric_limits<double>::infinity();  // they are no further apart
+  double monotonic_s = 0;  // CLOCK_MONOTONIC
+  double wall_s = 0;       // CLOCK_REALTIME, since 1970
+  // Both clocks were read within this time.
+  double bracket_s = std::numeric_limits<double>::infinity();
 };
 
 // The best of a few reads.

@@ -1,11 +1,14 @@
 #pragma once
-// What POST /api/v1/detections sends, and each line of `replay --detections`: what a detector found in one frame, as JSON.
+// The body of POST /api/v1/detections and each line of `replay --detections`: what a detector found
+// in one frame, as JSON, read strictly (json_query.h).
 //
-//   {"frame": N | "time_s": t, "boxes": [{"u": 10, "v": 20, "width": 30, "height": 70, "score": 0.9, "class": "person"}, ...]}
+//   {"frame": N | "time_s": t,
+//    "boxes": [{"u": 10, "v": 20, "width": 30, "height": 70, "score": 0.9, "class": "person"},
+//              ...]}
 //
-// Boxes as in detection_box.h; score (1) and class (none) may be left out, and no box is an answer, too. A number that is null, as JSON
-// writes one that is not finite, is a NaN here. Whether numbers make sense for the frame is check_detections()'s to say. Read strictly
-// (json_query.h).
+// Boxes as in detection_box.h. score (default 1) and class (default none) may be left out. An empty
+// list of boxes is valid. JSON writes a number that is not finite as null; null is read as NaN.
+// check_detections() judges whether the numbers are possible for the frame.
 
 #include <string>
 #include <vector>
@@ -18,7 +21,7 @@ namespace alidade {
 inline constexpr std::size_t kMaxDetectionBytes = std::size_t{128} << 10;
 
 struct DetectionQuery {
-  FrameChoice which;  // one of the two
+  FrameChoice which;  // frame or time_s is set
   std::vector<DetectionBox> boxes;
 };
 

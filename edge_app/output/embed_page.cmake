@@ -1,10 +1,10 @@
 # cmake -DPAGE=status_page.html -DSOURCE=status_page_text.cpp -P embed_page.cmake
-# Writes the page into a C++ source, with the Content-Security-Policy that allows its style and its script, by
-# their SHA-256, and nothing from elsewhere.
+# Writes the page into a C++ source, together with a Content-Security-Policy. The policy allows the
+# page's style and script by their SHA-256, and nothing from elsewhere.
 cmake_minimum_required(VERSION 3.16)
 file(READ "${PAGE}" page)
 
-# The text between <element> and </element>, of which there is one.
+# The text between <element> and </element>, which must occur once.
 function(text_of element result)
   string(REGEX MATCHALL "<${element}>" openings "${page}")
   list(LENGTH openings count)
@@ -20,7 +20,7 @@ function(text_of element result)
   set(${result} "${text}" PARENT_SCOPE)
 endfunction()
 
-# A SHA-256 as a policy states it: 256 bits and two zeros are 43 digits of base64.
+# A SHA-256 as a policy has it: 256 bits and two zero bits are 43 digits of base64.
 function(policy_hash text result)
   set(digits "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/")
   string(SHA256 hex "${text}")

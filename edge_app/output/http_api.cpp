@@ -101,7 +101,8 @@ ServerResponse scene_map(const HttpApiSources& sources) {
   return json_response(scene_json(sources.scene(), monotonic_now_s()));
 }
 
-// A fresh start throws away what the one before has gathered: not more often than one takes.
+// A fresh calibration discards what the one before has gathered. So it may not be started more
+// often than a calibration takes.
 struct CalibrationPause {
   static constexpr double kPauseS = 120;
   std::mutex mutex;
@@ -138,7 +139,7 @@ ServerResponse stream_ticket(HttpTickets* tickets) {
   return json_response({{"ticket", *ticket}, {"valid_s", HttpTickets::kValidS}});
 }
 
-// The record that a request is about. False: *error says why there is none.
+// Finds the record that a request asks for. False: *error says why there is none.
 bool choose_record(const HttpApiSources& sources, const FrameChoice& which,
                    OrientationRecord* record, ServerResponse* error) {
   FrameSearch found = FrameSearch::kFound;
@@ -204,7 +205,7 @@ int http_status_of(DetectionStatus status) {
   }
 }
 
-// The record of the frame whose detections come.
+// Finds the record of the frame to which detections belong.
 DetectionStatus find_detected(const LiveState& live, const FrameChoice& which,
                               OrientationRecord* record) {
   const auto newest = live.newest_oriented();

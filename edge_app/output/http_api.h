@@ -1,7 +1,7 @@
 #pragma once
-// The endpoints of `alidade run`, as openapi.yaml describes them: what the LiveState and the pipeline know, as
-// JSON, Server-Sent Events and Prometheus text. Handlers run on the server's threads; nothing here reaches the
-// real-time thread.
+// The HTTP endpoints of `alidade run`, described by openapi.yaml. They give the data of LiveState
+// and pipeline as JSON, Server-Sent Events and Prometheus text. Handlers run on the server's
+// threads. Nothing here touches the real-time thread.
 
 #include <functional>
 #include <memory>
@@ -24,29 +24,29 @@ struct HttpApiSources {
   LiveState* live = nullptr;
   std::function<PipelineSummary()> summary;
   std::function<FrameSourceCounters()> video_losses;
-  // False: nothing is calibrated here.
+  // Returns false if nothing is calibrated.
   std::function<bool()> ask_for_calibration;
-  // Empty without one. The zoom curve in use; null: there is none.
+  // The zoom curve in use; returns null if there is none. May be an empty function.
   std::function<std::shared_ptr<const ZoomCurve>()> zoom_curve;
   std::shared_ptr<const PlaneEstimate> plane;  // null: none is configured
-  // What is known of the ground to a fit, both JSON; false with one line.
+  // Fits the ground plane. body and *answer are JSON; false with one line in *error.
   std::function<bool(const std::string& body, std::string* answer, std::string* error)> fit_plane;
-  // Both null where nothing is tracked. Borrowed as live is; where there are some, they wake the server, too.
+  // Both null if nothing is tracked. They must live as long as `live`. They wake the server, too.
   TargetFeed* targets = nullptr;
   TargetLines* target_lines = nullptr;
-  std::function<DetectorsReport()> detectors;  // empty: none is built in
-  const MqttPublisher* mqtt = nullptr;         // null: no broker is told
+  std::function<DetectorsReport()> detectors;  // empty: no built-in detector
+  const MqttPublisher* mqtt = nullptr;         // null: no broker
   std::function<SceneReport()> scene;          // empty: no scene map is in use
   std::string version;
-  std::string camera;            // the video source's name, without a password
+  std::string camera;            // name of the video source, without a password
   bool latency_measured = true;  // false for a recording
 };
 
-// Null: there is none.
+// Null if there is none.
 [[nodiscard]] std::shared_ptr<const ZoomCurve> zoom_curve_of(const HttpApiSources& sources);
 
-// Borrows *sources.live, and calls the functions, until the server has stopped. Every record wakes the server: that must
-// exist as long as there are records, stopped or not.
+// *sources.live and the functions are used until the server has stopped. Every record wakes the
+// server. So the server must exist as long as records come, even after it has stopped.
 void add_api_routes(HttpServer* server, const HttpApiSources& sources);
 
 }  // namespace alidade

@@ -12,7 +12,7 @@ using Json = nlohmann::ordered_json;
 
 namespace {
 
-// Deeper documents would take a hundred bytes for each of their own.
+// A deep document would take a hundred bytes of memory for each of its own.
 bool is_shallow(const std::string& text, int deepest) {
   int depth = 0;
   bool in_string = false;

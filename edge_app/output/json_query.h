@@ -1,6 +1,7 @@
 #pragma once
-// What requests as JSON have in common: read strictly (an unknown key, a wrong type, what is not finite is an error that says so), by pure
-// parsers that take memory in proportion to the text, which the caller bounds; and the choice of a frame.
+// What requests in JSON share: strict reading and the choice of a frame. An unknown key, a wrong
+// type or a number that is not finite is an error that says so. The parsers are pure. They take
+// memory in proportion to the text, whose length the caller limits.
 
 #include <cstdint>
 #include <nlohmann/json_fwd.hpp>
@@ -10,13 +11,13 @@
 
 namespace alidade {
 
-// Neither: the newest with an orientation. Never both.
+// At most one is set. Neither: the newest frame with an orientation.
 struct FrameChoice {
   std::optional<std::int64_t> frame;
   std::optional<double> time_s;
 };
 
-// An object no deeper than this, with no other keys. False with one line in *error.
+// Parses an object of at most this depth with only these keys. False with one line in *error.
 [[nodiscard]] bool parse_json_object(const std::string& body, int deepest,
                                      const std::set<std::string>& keys,
                                      nlohmann::ordered_json* object, std::string* error);
@@ -25,10 +26,11 @@ struct FrameChoice {
 
 inline constexpr const char* kFrameNumberRange = "frame must be an integer, 0 or more, below 2^63";
 
-// A frame's number as a query has it: digits, of the range that JSON may tell. Empty: it is none.
+// A frame number from a query: digits only, in the same range as in JSON. Empty: not a frame
+// number.
 [[nodiscard]] std::optional<std::int64_t> frame_number(const std::string& text);
 
-// Keys frame and time_s.
+// Reads the keys frame and time_s.
 [[nodiscard]] bool parse_frame_choice(const nlohmann::ordered_json& object, FrameChoice* which,
                                       std::string* error);
 

@@ -1,5 +1,5 @@
 #pragma once
-// A lens as a table for people, one row a parameter in LensParameter's order.
+// A lens as a table for people: one row for each parameter, in the order of LensParameter.
 
 #include <string>
 #include <vector>
@@ -10,9 +10,9 @@ namespace alidade {
 
 struct LensRow {
   const char* name;
-  std::string value;  // the line delay in us/row, all else in its own unit
+  std::string value;  // line delay in us/row; others in their own unit
   std::string sigma;
-  const char* unit;  // empty: a plain number
+  const char* unit;  // empty: dimensionless
 };
 
 [[nodiscard]] std::vector<LensRow> lens_rows(const PatternCalibration& calibration);

@@ -21,13 +21,13 @@ LineWriter::LineWriter(int descriptor, std::string name, std::string what, Stall
 LineWriter::~LineWriter() { ::close(wake_); }
 
 void LineWriter::interrupt() {
-  // Fails only if the counter is full, and then the descriptor is readable already.
+  // Fails only if the counter is full. Then the descriptor is readable already.
   static_cast<void>(::eventfd_write(wake_, 1));
 }
 
 bool LineWriter::write(std::string line) {
   taken_ = false;
-  // A line that was begun is ended before the next one.
+  // First finish a line that was begun.
   if (!write_rest()) return false;
   if (rest_.empty()) {
     rest_ = std::move(line);
@@ -48,17 +48,17 @@ LineWriter::Ready LineWriter::wait_until_writable() {
     ready = ::poll(descriptors, 2, patience_ms);
   } while (ready < 0 && errno == EINTR);
   if (ready < 0) return Ready::kFailed;
-  // POLLERR or POLLHUP: let write(2) say what is wrong.
+  // On POLLERR or POLLHUP write(2) will say what is wrong.
   return descriptors[0].revents != 0 ? Ready::kYes : Ready::kNo;
 }
 
-// As much of it as is to be written now.
+// Writes as much of rest_ as possible now.
 bool LineWriter::write_rest() {
   std::size_t written = 0;
   while (written < rest_.size()) {
     const Ready ready = wait_until_writable();
     if (ready == Ready::kNo) break;
-    // A pipe that polls writable takes PIPE_BUF (4096) bytes without waiting, more than any record.
+    // A pipe that is ready takes PIPE_BUF (4096) bytes without waiting. No record is longer.
     const ssize_t count = ready == Ready::kFailed ? -1
                                                   : ::write(descriptor_, rest_.data() + written,
                                                             rest_.size() - written);

@@ -1,9 +1,10 @@
 #pragma once
-// LineWriter: lines to a file descriptor (stdout or a file), one write(2) a line, so that a reader sees each line at once.
+// LineWriter: writes lines to a file descriptor (stdout or a file), one write(2) for each line, so
+// that a reader sees each line at once.
 //
-// A pipe whose reader is slow makes write() wait until interrupt(), or not at all, as is chosen: what cannot be written at once is
-// then dropped and counted, whole lines only, so that neither what others read nor the end of the program wait for a reader.
-// SIGPIPE must be ignored by the program.
+// If the reader of a pipe is slow, write() either waits until interrupt(), or drops and counts
+// whole lines that cannot be written at once. With dropping, neither other readers nor the end of
+// the program wait for this reader. The program must ignore SIGPIPE.
 
 #include <atomic>
 #include <cstddef>
@@ -13,25 +14,25 @@ namespace alidade {
 
 class LineWriter {
  public:
-  // What a reader that takes nothing gets.
+  // What happens if the reader takes nothing.
   enum class Stalled {
-    kWait,  // every line, until interrupt()
-    kDrop   // those that there is room for
+    kWait,  // write() waits, until interrupt()
+    kDrop   // lines for which there is no room are dropped
   };
 
-  // Borrows `descriptor`; `name` is for messages, `what` is what a line is in them.
+  // Does not own `descriptor`. name: of the file; what: of the lines, both for messages.
   LineWriter(int descriptor, std::string name, std::string what, Stalled stalled);
   ~LineWriter();
   LineWriter(const LineWriter&) = delete;
   LineWriter& operator=(const LineWriter&) = delete;
 
-  // Each ends with a line feed. False: no more can be written, see error().
+  // The line must end with a line feed. False: no more can be written, see error().
   [[nodiscard]] bool write(std::string line);
-  // Thread-safe. From now on write() does not wait.
+  // Any thread. From now on write() does not wait.
   void interrupt();
   [[nodiscard]] const std::string& error() const { return error_; }
   [[nodiscard]] std::size_t dropped() const { return dropped_; }
-  // Whether the last line that write() was given was written, as a whole or its beginning.
+  // Whether the last line given to write() was written, at least its beginning.
   [[nodiscard]] bool taken() const { return taken_; }
 
  private:
@@ -44,7 +45,7 @@ class LineWriter {
   int wake_;  // eventfd, readable after interrupt()
   std::string name_;
   std::string what_;
-  std::string rest_;  // of a line that was begun
+  std::string rest_;  // unwritten rest of a line
   bool taken_ = false;
   std::atomic<std::size_t> dropped_{0};
   std::string error_;

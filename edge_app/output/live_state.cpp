@@ -52,7 +52,8 @@ bool LiveState::write(const OrientationRecord& record) {
     add_to_history(record);
     ++last_id_;
     if (line == nullptr) {
-      // Nobody reads yet, or the first reader came only now: it begins with the next record.
+      // There is no reader, or the first one came after the check above. It begins with the next
+      // record.
       lines_.clear();
       for (Reader* reader : readers_) reader->next_ = last_id_ + 1;
     } else {
@@ -65,7 +66,8 @@ bool LiveState::write(const OrientationRecord& record) {
 }
 
 void LiveState::keep(const OrientationRecord& record) {
-  // Another recording, or a clock that began anew: older frames would be found at the wrong times.
+  // Time jumped back: another recording, or a clock that restarted. Older frames would be found at
+  // wrong times.
   if (!kept_.empty() && *record.time_s < *kept_.back().time_s) kept_.clear();
   kept_.push_back(record);
   while (kept_.size() > options_.max_kept ||
@@ -131,7 +133,8 @@ FrameSearch LiveState::find_at(double time_s, OrientationRecord* record) const {
   if (nearest + 1 < kept_.size())
     period_s = std::min(period_s, time_of(nearest + 1) - time_of(nearest));
   if (kept_.size() == 1) period_s = 0;
-  // Whoever asks may have the time by another clock, and the first frames' times can lie close together.
+  // The caller may have the time from another clock, and the times of the first frames can lie
+  // close together.
   constexpr double kLeastReach_s = 1e-3;
   const double reach_s = std::max(period_s / 2, kLeastReach_s);
   if (!(std::abs(time_s - time_of(nearest)) <= reach_s)) return FrameSearch::kNotKept;

@@ -1,11 +1,12 @@
 #pragma once
-// LiveState: the latest records, for whoever asks while `alidade run` goes on: those of the last seconds whole, for
-// directions of their pixels; the last minute thinned out, for plots; and as lines, for readers that follow.
+// LiveState: the latest records of `alidade run`, for readers on other threads. It keeps the
+// records of the last seconds complete (for directions of pixels), the last minute thinned out (for
+// plots), and lines of JSON (for readers that follow).
 //
-// A reader has a place in one ring of lines that all readers share: it waits for nobody and nobody waits for it.
-// One that is slower than the records loses the oldest that it has not read, and is told how many.
-// write() is the output thread's: it formats, takes a lock for microseconds and never waits for a reader. All
-// else may be called by any thread. Bounded memory: about 3 kB a record kept, 1.5 kB a line.
+// All readers share one ring of lines. No reader waits for another. A reader that is too slow loses
+// the oldest lines and learns how many. write() is for the output thread: it formats the record,
+// holds a lock for microseconds and never waits for a reader. Any thread may call all other
+// functions. Memory is bounded: about 3 kB for each kept record and 1.5 kB for each line.
 
 #include <cstdint>
 #include <deque>
@@ -24,14 +25,14 @@
 namespace alidade {
 
 struct LiveStateOptions {
-  double kept_s = 10;           // of records with a frame, by time_s
-  std::size_t max_kept = 2048;  // of them
-  std::size_t max_lines = 512;  // that a slow reader may be behind
+  double kept_s = 10;           // s of time_s; how long records with a frame are kept
+  std::size_t max_kept = 2048;  // at most so many of them
+  std::size_t max_lines = 512;  // that a reader may be behind
   double history_s = 60;
   double history_step_s = 0.1;
 };
 
-// What is plotted of one time step.
+// One time step of the plots.
 struct HistorySample {
   double time_s = 0;
   RecordMode mode = RecordMode::kNone;
@@ -39,10 +40,10 @@ struct HistorySample {
   std::optional<double> tilt_rad;
   int landmarks = 0;
   std::optional<double> residual_px;
-  std::optional<double> latency_s;  // the longest of the step
+  std::optional<double> latency_s;  // longest of the step
 };
 
-// What a reader has had so far; lost is also what it has not yet been told of.
+// What a reader has got so far. `lost` includes losses that it does not know of yet.
 struct ReaderCounters {
   std::int64_t records = 0;
   std::int64_t lost = 0;
@@ -59,34 +60,36 @@ class LiveState final : public RecordSink {
   [[nodiscard]] std::string error() const override { return ""; }
 
   [[nodiscard]] std::optional<OrientationRecord> newest() const;
-  // The newest that has an orientation.
+  // The newest record with an orientation.
   [[nodiscard]] std::optional<OrientationRecord> newest_oriented() const;
   [[nodiscard]] FrameSearch find(std::int64_t frame, OrientationRecord* record) const;
-  // The frame whose row 0 was exposed nearest to time_s, no further from it than half the way to the next frame, or than 1 ms.
+  // The frame whose row 0 was exposed nearest to time_s. The distance may be at most half the time
+  // to the nearer neighbour of that frame, or 1 ms if that is more.
   [[nodiscard]] FrameSearch find_at(double time_s, OrientationRecord* record) const;
   [[nodiscard]] std::vector<HistorySample> history() const;
-  // When, on the host's clock, the calibration in use was first seen; empty before the first record.
+  // Host time at which the calibration in use was first seen; empty before the first record.
   [[nodiscard]] std::optional<double> calibration_since_s() const;
 
-  // Of this process: tells a client that it meets another one.
+  // Random for each process, so that a client notices a restart.
   [[nodiscard]] const std::string& start_id() const { return start_id_; }
   [[nodiscard]] double started_s() const { return started_s_; }
 
-  // Before the first record. Called by write() when there is something to take for a reader; must not wait.
+  // Must be called before the first record. write() calls on_news when a reader can take something;
+  // on_news must not wait.
   void set_on_news(std::function<void()> on_news) { on_news_ = std::move(on_news); }
 
-  // What came for a reader since it last asked.
+  // What came for a reader since its last take().
   struct News {
-    std::int64_t lost = 0;  // records before those here
+    std::int64_t lost = 0;  // records lost before `lines`
     struct Line {
-      std::int64_t id = 0;  // of the record, counted from 1
+      std::int64_t id = 0;  // number of the record, from 1
       std::shared_ptr<const std::string> json;
     };
     std::vector<Line> lines;  // oldest first; at most kBatch
   };
   static constexpr std::size_t kBatch = 16;
 
-  // Follows from the record after the newest on. One thread; must not outlive the state.
+  // Begins with the record after the newest. For one thread; must not outlive the state.
   class Reader {
    public:
     explicit Reader(LiveState* state);
@@ -103,7 +106,7 @@ class LiveState final : public RecordSink {
   };
 
   [[nodiscard]] std::vector<ReaderCounters> readers() const;
-  // Of all readers that have been.
+  // Of all readers, present and past.
   [[nodiscard]] std::int64_t lost_by_readers() const;
 
  private:
@@ -118,14 +121,14 @@ class LiveState final : public RecordSink {
 
   std::function<void()> on_news_ = [] {};
 
-  mutable PriorityMutex mutex_;  // the output thread writes before those who read
+  mutable PriorityMutex mutex_;  // the output thread goes first
   std::optional<OrientationRecord> newest_;
   std::optional<OrientationRecord> newest_oriented_;
   double calibration_since_s_ = 0;
   std::deque<OrientationRecord> kept_;  // with frame and time, oldest first
   std::deque<HistorySample> history_;
   std::int64_t last_id_ = 0;
-  std::deque<std::shared_ptr<const std::string>> lines_;  // the last one is record last_id_
+  std::deque<std::shared_ptr<const std::string>> lines_;  // back(): record last_id_
   std::list<Reader*> readers_;
   std::int64_t lost_by_past_readers_ = 0;
 };

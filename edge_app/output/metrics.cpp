@@ -53,7 +53,7 @@ void MetricsText::add(const LatencyHistogram& histogram, const Labels& labels) {
   Labels with_edge = labels;
   with_edge.emplace_back("le", "");
   std::int64_t below = 0;
-  // The last bucket holds all that is longer.
+  // The last bucket holds everything longer; +Inf below covers it.
   for (std::size_t i = 0; i + 1 < LatencyHistogram::kBuckets; ++i) {
     below += histogram.count(i);
     if (i % kEvery != 0) continue;

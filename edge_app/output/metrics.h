@@ -1,9 +1,11 @@
 #pragma once
-// MetricsText: Prometheus' text format, one family after the other. Names bear their unit, counters end in _total.
+// MetricsText: Prometheus' text format, one family after the other. Names contain their unit; names
+// of counters end in _total.
 //   # HELP alidade_frames_total Video frames
 //   # TYPE alidade_frames_total counter
 //   alidade_frames_total 1234
-// A value that is not finite is written as NaN, +Inf, -Inf, which the format knows. Pure; allocates.
+// A value that is not finite is written as NaN, +Inf or -Inf, as the format allows. Pure;
+// allocates.
 
 #include <cstdint>
 #include <string>
@@ -16,10 +18,10 @@ namespace alidade {
 
 class MetricsText {
  public:
-  // Names and values; values may hold any text.
+  // Names and values; a value may be any text.
   using Labels = std::vector<std::pair<std::string, std::string>>;
 
-  // Begins a family, to which what follows belongs.
+  // These begin a family. The values that follow belong to it.
   void gauge(const std::string& name, const std::string& help) { begin(name, help, "gauge"); }
   void counter(const std::string& name, const std::string& help) { begin(name, help, "counter"); }
   void histogram(const std::string& name, const std::string& help) {
@@ -28,7 +30,8 @@ class MetricsText {
 
   void add(double value, const Labels& labels = {});
   void add(std::int64_t value, const Labels& labels = {});
-  // Of a histogram family; every 16th bucket is written, each 2.2 times as long as the one before.
+  // For a histogram family. Every 16th bucket is written; each is 2.2 times as long as the one
+  // before.
   void add(const LatencyHistogram& histogram, const Labels& labels = {});
 
   [[nodiscard]] const std::string& text() const { return text_; }

@@ -21,7 +21,7 @@ namespace {
 
 constexpr double kMilli = 1000;
 
-// Once, and as long as the program lasts.
+// Initializes the library once, for the life of the program.
 bool library_is_ready() {
   static const bool ready = mosquitto_lib_init() == MOSQ_ERR_SUCCESS;
   return ready;
@@ -79,7 +79,7 @@ bool MqttConnection::fail_with(const std::string& what) {
   return false;
 }
 
-// Login and TLS.
+// Sets login and TLS.
 bool MqttConnection::set_up() {
   if (client_ == nullptr) return fail_with("there is no memory for a connection");
   if (!set_up_error_.empty()) return fail_with(set_up_error_);
@@ -163,7 +163,8 @@ void MqttConnection::fail_refused(int answer) {
   }
 }
 
-// What the socket itself knows of a connection that did not come about. While TLS begins, the library takes that for patience.
+// Asks the socket itself why there is no connection. During the TLS handshake the library takes
+// such a failure for a need to wait.
 bool MqttConnection::has_broken_off(bool* hung_up) {
   pollfd socket{this->socket(), POLLIN, 0};
   *hung_up = ::poll(&socket, 1, 0) == 1 && (socket.revents & (POLLERR | POLLHUP)) != 0;
@@ -171,13 +172,13 @@ bool MqttConnection::has_broken_off(bool* hung_up) {
   int error_number = 0;
   socklen_t size = sizeof error_number;
   static_cast<void>(::getsockopt(socket.fd, SOL_SOCKET, SO_ERROR, &error_number, &size));
-  // Before a reset there may have been an answer, which says more.
+  // Before a reset the broker may have sent an answer, which says more.
   if (error_number == 0 || error_number == ECONNRESET) return false;
   fail(error_number, MOSQ_ERR_ERRNO);
   return true;
 }
 
-// Whether this result of the library is an end; then the error is set.
+// Whether this result of the library ends the connection. Then the error is set.
 bool MqttConnection::has_failed(int code) {
   if (code == MOSQ_ERR_SUCCESS && mosquitto_socket(client_) >= 0) return false;
   if (ending_) return true;
@@ -185,8 +186,8 @@ bool MqttConnection::has_failed(int code) {
   return true;
 }
 
-// The library takes memory for as long a packet as the broker tells, up to 256 MB. A publisher is sent nothing but answers of two
-// or four bytes.
+// Checks the length of a packet before the library reads it. The library would allocate as much as
+// the broker states, up to 256 MB. A publisher only gets answers of two or four bytes.
 MqttConnection::Incoming MqttConnection::look_at_what_comes() const {
   std::array<std::uint8_t, 4> bytes{};
   int count = 0;
@@ -212,8 +213,8 @@ MqttConnection::Incoming MqttConnection::look_at_what_comes() const {
 }
 
 bool MqttConnection::read_answers() {
-  constexpr int kMost = 16;        // then others have their turn
-  constexpr int kMostPackets = 1;  // as its manual has it
+  constexpr int kMost = 16;        // answers in one step, so that other work has its turn
+  constexpr int kMostPackets = 1;  // the value that the library's manual asks for
   constexpr double kHalf_s = 1;
   for (int i = 0; i < kMost; ++i) {
     const Incoming incoming = look_at_what_comes();
@@ -284,7 +285,7 @@ void MqttConnection::end() {
 
 std::string MqttConnection::try_once(const MqttOptions& options) {
   MqttOptions of_a_stranger = options;
-  // The one of a program that runs would throw that out.
+  // A second client with the same id would disconnect a running program.
   of_a_stranger.client_id.clear();
   MqttConnection connection(of_a_stranger, nullptr);
   if (!connection.begin()) return connection.error();

@@ -1,7 +1,9 @@
 #pragma once
-// MqttConnection: one connection to a broker, from the attempt to its end, by libmosquitto (MQTT 3.1.1). A new attempt is a new object, so that nothing
-// of an old connection is sent over a new one: what a broker retains is never overwritten by what is older. For one thread, which waits for socket() to be
-// ready, and calls step(). Looking up a name waits for the resolver; of a name with several addresses the first that does not refuse at once is taken.
+// MqttConnection: one connection to a broker, from the attempt to its end, by libmosquitto (MQTT
+// 3.1.1). Each attempt is a new object. So nothing of an old connection is sent over a new one, and
+// what a broker retains is never overwritten by something older. For one thread, which waits until
+// socket() is ready and then calls step(). Looking up a name blocks in the resolver. If a name has
+// several addresses, the first that does not refuse at once is taken.
 
 #include <functional>
 #include <memory>
@@ -27,34 +29,36 @@ class MqttConnection {
   MqttConnection(const MqttConnection&) = delete;
   MqttConnection& operator=(const MqttConnection&) = delete;
 
-  // The broker has a message, or with QoS 0: it was sent.
+  // Called when the broker has acknowledged a message; with QoS 0, when it was sent.
   void set_on_published(std::function<void(int id)> on_published) {
     on_published_ = std::move(on_published);
   }
 
-  // Begins to connect. False: it has failed.
+  // Begins to connect. False: it failed, see error().
   [[nodiscard]] bool begin();
-  // Reads and writes what can be at once. False: the connection has failed, or has ended.
+  // Reads and writes what is possible without waiting. False: the connection failed or ended.
   [[nodiscard]] bool step();
   [[nodiscard]] bool is_connected() const { return connected_; }
-  // What failed, in a line that names the broker and what would be right; no password.
+  // One line that says what failed, names the broker and says what would be right. Has no password.
   [[nodiscard]] const std::string& error() const { return error_; }
 
   [[nodiscard]] int socket() const;  // negative: none
-  // For what to wait there, and how long at most: while TLS begins it does not say what it waits for.
+  // What to wait for at socket(), and how long at most. During the TLS handshake the library does
+  // not say what it waits for.
   [[nodiscard]] bool wants_to_read() const { return half_since_s_ < 0; }
   [[nodiscard]] bool wants_to_write() const;
   [[nodiscard]] double patience_s() const;
 
-  // Takes it up for sending. Connected only; false: it cannot be sent.
+  // Queues a message. Only while connected. False: it cannot be sent.
   [[nodiscard]] bool publish(const std::string& topic, const std::string& payload, bool retain,
                              int* id);
-  // Says farewell: there is no will then.
+  // Disconnects properly, so that the broker does not publish the will.
   void end();
 
-  // Of the files of TLS, before anything is tried: empty if all can be read.
+  // Checks the TLS files before a connection is tried. Empty if all can be read.
   [[nodiscard]] static std::string files_error(const MqttOptions& options);
-  // One connection without a will, for a check: empty if the broker takes it within options.timeout_s, else what failed.
+  // For `check`: makes one connection without a will. Empty if the broker accepts it within
+  // options.timeout_s, else what failed.
   [[nodiscard]] static std::string try_once(const MqttOptions& options);
 
  private:
@@ -73,10 +77,10 @@ class MqttConnection {
   mosquitto* client_ = nullptr;
   bool connected_ = false;
   bool ending_ = false;
-  double give_up_s_ = 0;      // monotonic
-  double half_since_s_ = -1;  // so long an answer has not been whole; < 0: none is half
+  double give_up_s_ = 0;      // monotonic time
+  double half_since_s_ = -1;  // monotonic time since when an answer is incomplete; < 0: none is
   std::string error_;
-  std::string last_complaint_;  // of the library
+  std::string last_complaint_;  // last error of the library
   std::string set_up_error_;
   std::function<void(int)> on_published_ = [](int) {};
 

@@ -1,5 +1,6 @@
 #pragma once
-// Which MQTT broker is told, and how: section `mqtt` of the configuration (edge_app/config/mqtt_config.h).
+// Where and how to publish by MQTT: section `mqtt` of the configuration
+// (edge_app/config/mqtt_config.h).
 
 #include <string>
 
@@ -14,13 +15,13 @@ struct MqttOptions {
   std::string key_file;          // PEM, with certificate_file
   std::string user;              // empty: none
   std::string password;
-  std::string client_id;  // empty: one of chance
+  std::string client_id;  // empty: random
   std::string prefix = "alidade";
   int qos = 1;
-  int keep_alive_s = 15;      // after half as long again without a sign the broker says `offline`
-  double timeout_s = 5;       // from an attempt to the broker's answer
-  double max_backoff_s = 30;  // longest pause between two attempts
-  double orientation_rate_hz = 1;  // 0: no orientation is published
+  int keep_alive_s = 15;      // after 1.5 times that without a sign the broker publishes `offline`
+  double timeout_s = 5;       // s, from an attempt to the broker's answer
+  double max_backoff_s = 30;  // s, longest pause between two attempts
+  double orientation_rate_hz = 1;  // at most; 0: orientation is not published
 
   // For messages: mqtts://broker:8883.
   [[nodiscard]] std::string name() const {

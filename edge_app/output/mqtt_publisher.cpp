@@ -84,7 +84,7 @@ void MqttPublisher::run() {
   }
 }
 
-// Until it fails, or all ends.
+// Returns when the connection fails or the publisher ends.
 void MqttPublisher::keep_connected(MqttConnection* connection) {
   while (connection->step()) {
     if (connection->is_connected() && !connected_) connection_begins();
@@ -108,12 +108,12 @@ void MqttPublisher::connection_begins() {
   ++connections_;
   told_.clear();
   spdlog::info("MQTT: connected to {}, topics {}/...", options_.name(), options_.prefix);
-  // What was under way is sent again, or what has come since.
+  // Send again what was under way, or what replaced it since.
   for (Slot& slot : slots_) {
     slot.under_way.reset();
     slot.waits = slot.newest != nullptr;
   }
-  // A record of before is of no use, unlike targets.
+  // An old record is of no use, unlike old targets.
   slots_[kOrientation].waits = false;
   {
     const std::lock_guard<PriorityMutex> lock(record_mutex_);
@@ -131,7 +131,7 @@ double MqttPublisher::next_due_s() const {
   return counts_down ? std::min(next_clock_s_, next_record_s_) : next_clock_s_;
 }
 
-// What is new since.
+// Collects what is new since the last call.
 void MqttPublisher::gather(double now_s) {
   std::shared_ptr<const std::string> targets;
   {
@@ -198,7 +198,7 @@ void MqttPublisher::say_farewell(MqttConnection* connection) {
   connection->end();
 }
 
-// For the socket, news, or the time.
+// Waits for the socket, for news, or until until_s.
 void MqttPublisher::wait_for(const MqttConnection* connection, double until_s) {
   std::array<pollfd, 2> both = {{{news_.get(), POLLIN, 0}, {-1, POLLIN, 0}}};
   if (connection != nullptr) {
@@ -213,13 +213,13 @@ void MqttPublisher::wait_for(const MqttConnection* connection, double until_s) {
   if (both[0].revents != 0) static_cast<void>(::eventfd_read(news_.get(), &count));
 }
 
-// News do not shorten it.
+// News do not shorten the pause.
 void MqttPublisher::pause(double seconds) {
   const double until_s = monotonic_now_s() + seconds;
   while (!ends_ && monotonic_now_s() < until_s) wait_for(nullptr, until_s);
 }
 
-// Once, and not at each attempt.
+// Logs a failure once, not at each attempt.
 void MqttPublisher::tell_of_failure(const std::string& error, bool was_connected) {
   if (!was_connected && error == told_) return;
   told_ = error;

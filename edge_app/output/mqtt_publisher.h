@@ -1,12 +1,14 @@
 #pragma once
-// MqttPublisher: the newest state to an MQTT broker, on a niced thread of its own.
-//   PREFIX/status        online; offline after the end, and as last will; retained
-//   PREFIX/targets       targets after a frame of detections, as the event `targets` of the stream; retained
-//   PREFIX/clock         host clock and wall clock at one instant, each ten seconds; retained
+// MqttPublisher: publishes the newest state to an MQTT broker, on a niced thread of its own.
+//   PREFIX/status        online; offline at the end and as last will; retained
+//   PREFIX/targets       targets after a frame of detections, like the event `targets`; retained
+//   PREFIX/clock         host clock and wall clock (clock_pair.h), every ten seconds; retained
 //   PREFIX/orientation   the newest record, at most orientation_rate_hz times a second
-// Of each topic one message is under way, and the newest behind it waits; what comes meanwhile replaces that. So a broker that is slow, silent or
-// gone costs no memory and no time of anybody else, and has the newest when it is back. Attempts to connect pause longer and longer. Targets that a
-// broker retains of an earlier run are taken away at the first connection, as their times and identities mean nothing any more.
+// For each topic one message is under way and at most one waits; a newer one replaces it. So a
+// slow, silent or missing broker costs no memory and delays nobody, and gets the newest state when
+// it is back. The pauses between attempts to connect grow. The first connection deletes targets
+// that the broker retains from an earlier run, as their times and identities have lost their
+// meaning.
 
 #include <array>
 #include <atomic>
@@ -28,8 +30,8 @@ namespace alidade {
 struct MqttCounters {
   bool connected = false;
   std::int64_t connections = 0;
-  std::int64_t published = 0;  // messages that the broker has taken
-  std::int64_t replaced = 0;   // states that newer ones took the place of, unsent
+  std::int64_t published = 0;  // messages that the broker has acknowledged
+  std::int64_t replaced = 0;   // states that were replaced before they were sent
 };
 
 class MqttPublisher final : public RecordSink {
@@ -37,13 +39,13 @@ class MqttPublisher final : public RecordSink {
   explicit MqttPublisher(const MqttOptions& options);
   ~MqttPublisher() override;
 
-  [[nodiscard]] bool start();  // false: there can be no thread
-  // Says offline, if the broker is there and takes it within half a second.
+  [[nodiscard]] bool start();  // false: the thread cannot be started
+  // Publishes offline, if the broker accepts it within half a second.
   void stop();
 
-  // Any thread; waits for nobody.
+  // Any thread; does not wait.
   void take_targets(std::shared_ptr<const std::string> json);
-  // Output thread.
+  // For the output thread.
   [[nodiscard]] bool write(const OrientationRecord& record) override;
   void interrupt() override {}
   [[nodiscard]] std::string error() const override { return ""; }
@@ -52,13 +54,13 @@ class MqttPublisher final : public RecordSink {
 
  private:
   enum Topic : std::size_t { kStatus, kTargets, kClock, kOrientation, kTopics };
-  // The thread's.
+  // Only for thread_.
   struct Slot {
     std::string topic;
     bool retain = true;
-    std::shared_ptr<const std::string> newest;  // null: there is none
-    bool waits = false;                         // to be sent
-    std::optional<int> under_way;               // its id
+    std::shared_ptr<const std::string> newest;  // null: none yet
+    bool waits = false;                         // newest must be sent
+    std::optional<int> under_way;               // id of the message that is under way
   };
 
   void run();
@@ -80,16 +82,16 @@ class MqttPublisher final : public RecordSink {
   std::atomic<bool> ends_{false};
   std::atomic<bool> wants_record_{false};
 
-  mutable std::mutex targets_mutex_;  // held for moments, as those below
+  mutable std::mutex targets_mutex_;  // held for moments only, as record_mutex_
   std::shared_ptr<const std::string> offered_targets_;
-  PriorityMutex record_mutex_;  // the output thread writes
+  PriorityMutex record_mutex_;  // the output thread goes first
   std::optional<OrientationRecord> offered_record_;
 
   std::array<Slot, kTopics> slots_;
   bool first_connection_ = true;
   double next_clock_s_ = 0;
   double next_record_s_ = 0;
-  std::string told_;  // the failure that was logged last
+  std::string told_;  // last failure that was logged
 
   std::atomic<bool> connected_{false};
   std::atomic<std::int64_t> connections_{0};

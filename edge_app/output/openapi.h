@@ -1,5 +1,5 @@
 #pragma once
-// The text of openapi.yaml, which describes the HTTP API; the build puts it into the program.
+// The text of openapi.yaml, which describes the HTTP API. The build embeds it in the program.
 
 namespace alidade {
 

@@ -1,5 +1,5 @@
 #pragma once
-// A value that may be unknown, as JSON has it. Pure.
+// An optional value as JSON: null if it is empty. Pure.
 
 #include <nlohmann/json.hpp>
 #include <optional>

@@ -22,11 +22,11 @@ using report::kDegrees;
 using report::kHalf_px;
 using report::kWide_px;
 
-// What the sections share: residuals with and without rolling shutter, by time and place.
+// A residual with its time and place, for all sections.
 struct ShownResidual {
   double time_s;  // since the first frame
   Vector2<double> u;
-  Vector2<double> error;  // measured minus predicted, px
+  Vector2<double> error;  // px, measured minus predicted
 };
 
 class PatternPage {
@@ -34,7 +34,7 @@ class PatternPage {
   explicit PatternPage(const PatternReportInput& report)
       : report_(report), start_s_(report.data.frames.front().time_s) {
     with_ = shown(report.data, report.calibration.lens);
-    // All rows exposed together with the middle one.
+    // For comparison: a global shutter that exposes all rows when the middle row was exposed.
     const double line_delay = report.calibration.lens[index(LensParameter::kLineDelay)];
     PatternData at_once = report.data;
     for (PatternFrame& frame : at_once.frames)
@@ -182,7 +182,7 @@ class PatternPage {
     Vector2<double> sum = Vector2<double>::Zero();
     int count = 0;
   };
-  // With what was seen in them.
+  // All cells of the image with their residuals.
   [[nodiscard]] std::vector<Cell> cells() const {
     const ImageCells image(report_.data.width, report_.data.height);
     std::vector<Cell> cells;
@@ -200,7 +200,7 @@ class PatternPage {
   }
 
   void residuals_over_image() {
-    constexpr int kFewest = 5;  // that make a mean
+    constexpr int kFewest = 5;  // residuals for a mean
     SvgPlot plot = image_plot();
     const std::vector<Cell> all = cells();
     double longest = 0;
@@ -223,7 +223,7 @@ class PatternPage {
         plot, "mean residuals over the image");
   }
 
-  // A wrong line delay or a too stiff curve bends them.
+  // With a wrong line delay or a too stiff curve these residuals depend on the row.
   void residuals_over_rows() {
     const double height = report_.data.height;
     std::vector<PlotPoint> with;
@@ -316,7 +316,7 @@ class PatternPage {
                     most, empty, all.size()),
         plot, "coverage of the image");
 
-    // Of each frame used.
+    // Tilt and distance in each used frame.
     const Vector3<double> middle = middle_of(report_.data.points_m);
     std::vector<PlotPoint> tilts;
     std::vector<PlotPoint> distances;

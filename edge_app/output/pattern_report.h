@@ -1,6 +1,6 @@
 #pragma once
-// report.html of `alidade calibrate-shutter`: line delay and lens to look at and to judge. One page as calibration_report.h's. Pure;
-// allocates.
+// report.html of `alidade calibrate-shutter`: line delay and lens for people to judge. A page like
+// that of calibration_report.h. Pure; allocates.
 
 #include <string>
 #include <vector>
@@ -12,14 +12,14 @@ namespace alidade {
 
 struct PatternReportInput {
   std::string name;     // of the video
-  std::string pattern;  // as the person named it
+  std::string pattern;  // as the user named it
   const PatternData& data;
-  const PatternCalibration& calibration;  // kOk
+  const PatternCalibration& calibration;  // must be kOk
   int images = 0;                         // read
   int found = 0;                          // with the pattern
   std::vector<std::string> remarks;
   std::string version;  // of the program
-  std::string date;     // and time of the report, with its zone
+  std::string date;     // date, time and zone of the report
 };
 
 [[nodiscard]] std::string pattern_report(const PatternReportInput& report);

@@ -50,7 +50,7 @@ bool parse_vectors(const Json& object, const char* key,
 }
 
 Json as_json(const Matrix2<double>& m) {
-  // Rounding may leave the two halves different in the last bit.
+  // Rounding may make the two halves differ in the last bit.
   const double off_diagonal = (m(0, 1) + m(1, 0)) / 2;
   return {{m(0, 0), off_diagonal}, {off_diagonal, m(1, 1)}};
 }
@@ -109,7 +109,7 @@ bool parse_pixel_query(const std::string& body, PixelQuery* query, std::string* 
       !parse_vectors<3>(object, "directions", &query->directions, error))
     return false;
   for (Vector3<double>& direction : query->directions) {
-    // Scaled first: squares of what is finite may not be.
+    // Scale first: the square of a finite number may not be finite.
     const double largest = direction.cwiseAbs().maxCoeff();
     if (!(largest > std::numeric_limits<double>::min())) {
       *error = "directions: a direction must not be zero";

@@ -1,14 +1,14 @@
 #pragma once
-// What POST /api/v1/direction and /api/v1/pixel ask, and their answers, as JSON: directions of a frame's pixels, each
-// at its own row's time, and the pixels that see given directions.
+// Requests and answers of POST /api/v1/direction and /api/v1/pixel as JSON: the directions of a
+// frame's pixels, each at the time of its own row, and the pixels that see given directions.
 //
 //   {"frame": N | "time_s": t, "pixels": [[u, v], ...], "pixel_sigma_px": s}
 //   {"frame": N | "time_s": t, "directions": [[x, y, z], ...]}
 //
-// Frames and units: frame_orientation.h, whose directions, pixels and covariances these are: of motion and
-// calibration together, how the motion was found with the calibration included, nothing twice. Of the pixel's
-// own noise, s^2 J_u J_u^T is added. Parsers are pure and strict (an unknown key, a wrong type, too many, what
-// is not finite is an error that says so) and take memory in proportion to the body, which the caller bounds.
+// Frames, units, directions, pixels and covariances are those of frame_orientation.h. A covariance
+// holds motion, calibration and the correlation of the two, each once; s^2 J_u J_u^T is added for
+// the noise of the pixel. The parsers are pure and strict (json_query.h); too many items are an
+// error, too.
 
 #include <cstdint>
 #include <optional>
@@ -28,12 +28,12 @@ inline constexpr std::size_t kMaxQueryBytes = std::size_t{64} << 10;
 struct DirectionQuery {
   FrameChoice which;
   std::vector<Vector2<double>> pixels;
-  double pixel_sigma_px = 0;  // of each coordinate; 0: pixels known exactly
+  double pixel_sigma_px = 0;  // of each coordinate; 0: pixels are exact
 };
 
 struct PixelQuery {
   FrameChoice which;
-  std::vector<Vector3<double>> directions;  // unit, base
+  std::vector<Vector3<double>> directions;  // unit vectors, base frame
 };
 
 // False with one line in *error.
@@ -42,7 +42,8 @@ struct PixelQuery {
 [[nodiscard]] bool parse_pixel_query(const std::string& body, PixelQuery* query,
                                      std::string* error);
 
-// Of a record with a frame and an orientation. One line of JSON with a line feed. With a plane each direction has its place on it.
+// The record must have a frame and an orientation. One line of JSON with a line feed. With a plane,
+// each direction also has its place on the plane.
 [[nodiscard]] std::string direction_answer(const OrientationRecord& record,
                                            const DirectionQuery& query,
                                            const PlaneEstimate* plane = nullptr);

@@ -1,6 +1,6 @@
 #pragma once
-// The ground plane as JSON: the answer of /api/v1/plane, a fit with its misfits, and what /api/v1/direction adds to a direction. Names and units are those of
-// plane.yaml.
+// The ground plane as JSON: the answer of /api/v1/plane, a fit with its misfits, and what
+// /api/v1/direction adds to a direction. Names and units are those of plane.yaml.
 
 #include <nlohmann/json_fwd.hpp>
 
@@ -9,15 +9,16 @@
 
 namespace alidade {
 
-// Values with sigmas, covariance, origin or null.
+// The values with their sigmas, the covariance, and the origin or null.
 [[nodiscard]] nlohmann::ordered_json plane_json(const PlaneEstimate& estimate);
 
-// Of a fit with kOk or kMisfit.
+// The fit must be kOk or kMisfit.
 [[nodiscard]] nlohmann::ordered_json plane_fit_json(const PlaneEvidence& evidence,
                                                     const PlaneFit& fit);
 
-// Where a direction with this covariance (rad^2, in its tangent_basis) meets the ground: position_m, covariance_m2, distance_m from
-// the camera, latitude_deg and longitude_deg where the plane has an origin; or error.
+// Where a direction meets the ground: position_m, covariance_m2, distance_m from the camera, and,
+// if the plane has an origin, latitude_deg and longitude_deg; otherwise error. d_b: base frame;
+// cov_d: rad^2, in tangent_basis(d_b).
 [[nodiscard]] nlohmann::ordered_json plane_point_json(const PlaneEstimate& estimate,
                                                       const Vector3<double>& d_b,
                                                       const Matrix2<double>& cov_d);

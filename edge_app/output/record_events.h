@@ -1,8 +1,13 @@
 #pragma once
-// RecordEvents: the records of a LiveState as Server-Sent Events, for one client (GET /api/v1/stream).
+// RecordEvents: the records of a LiveState as Server-Sent Events, for one client (GET
+// /api/v1/stream).
 //
-//   hello first, clock every few seconds, orientation for each record, lost where the client was too slow, targets after each frame of
-//   detections (the newest, if several came), a comment line when nothing else came for a while
+//   hello         first
+//   clock         every few seconds
+//   orientation   for each record
+//   lost          if the client was too slow
+//   targets       after each frame of detections; the newest, if several came
+//   (comment)     if nothing else came for a while
 
 #include <string>
 
@@ -14,7 +19,7 @@ namespace alidade {
 
 class RecordEvents final : public HttpStream {
  public:
-  // Borrows both; targets: null where nothing is tracked.
+  // Owns neither pointer. targets: null if nothing is tracked.
   RecordEvents(LiveState* live, const TargetLines* targets, std::string version);
 
   void next(std::string* piece) override;
@@ -26,8 +31,8 @@ class RecordEvents final : public HttpStream {
   const std::string version_;
   LiveState::Reader reader_;
   bool greeted_ = false;
-  double clock_due_s_ = 0;  // the first at once
-  double said_s_ = 0;       // when something was said
+  double clock_due_s_ = 0;  // 0: the first clock event is due at once
+  double said_s_ = 0;       // time of the last event
 };
 
 }  // namespace alidade

@@ -1,5 +1,6 @@
 #pragma once
-// RecordSinks: each record to several sinks, one after the other. The end of one is the end of all.
+// RecordSinks: gives each record to several sinks, one after the other. If one of them ends, all
+// end.
 
 #include <vector>
 
@@ -9,7 +10,7 @@ namespace alidade {
 
 class RecordSinks final : public RecordSink {
  public:
-  // Borrowed. Before the first record.
+  // Must be called before the first record. Does not own the sink.
   void add(RecordSink* sink) { sinks_.push_back(sink); }
 
   [[nodiscard]] bool write(const OrientationRecord& record) override {

@@ -1,5 +1,6 @@
 #pragma once
-// RecordWriter: records as lines to a file descriptor (stdout or a file): line_writer.h has what a slow reader gets.
+// RecordWriter: writes records as lines to a file descriptor (stdout or a file). Slow readers: see
+// line_writer.h.
 
 #include <cstddef>
 #include <string>
@@ -14,7 +15,7 @@ class RecordWriter final : public RecordSink {
  public:
   using Stalled = LineWriter::Stalled;
 
-  // Borrows `descriptor`; `name` is for messages. CSV starts with its header line.
+  // Does not own `descriptor`. name: for messages. CSV begins with a header line.
   RecordWriter(int descriptor, OutputFormat format, std::string name, Stalled stalled);
 
   [[nodiscard]] bool write(const OrientationRecord& record) override;

@@ -1,4 +1,5 @@
-// The report's page itself, and which frames of the recording it shows: those that were used, and the gaps between them.
+// The report's page itself, and which frames of the recording were used: the gaps between them and
+// the reasons for unused frames.
 
 #include <array>
 #include <cmath>
@@ -11,9 +12,9 @@
 namespace alidade::report {
 namespace {
 
-// Between neighbours of the frames used, where they are clearly farther apart than usual.
+// The times between two used frames that are clearly farther apart than usual.
 std::vector<Span> gaps_between(const std::vector<FrameResult>& frames, double start_s) {
-  constexpr double kUsual = 3.5;  // periods: a frame lost here and there is no gap
+  constexpr double kUsual = 3.5;  // median intervals; a few lost frames are no gap
   std::vector<double> intervals;
   for (std::size_t i = 1; i < frames.size(); ++i) {
     intervals.push_back(frames[i].time_s - frames[i - 1].time_s);
@@ -45,12 +46,12 @@ void ReportPage::line_between_gaps(const std::vector<TimedPoint>& points, const 
                                    SvgPlot* plot) const {
   std::vector<PlotPoint> piece;
   const auto end_piece = [&] {
-    // A line of one point shows nothing.
+    // A line of one point would be invisible.
     if (piece.size() == 1) plot->dots(piece, colour);
     if (piece.size() > 1) plot->line(piece, colour);
     piece.clear();
   };
-  std::size_t next = 0;  // the first gap that does not end before the point
+  std::size_t next = 0;  // first gap that ends after the point
   for (const TimedPoint& at : points) {
     for (; next < gaps_.size() && gaps_[next].end_s <= at.time_s; ++next) end_piece();
     if (next < gaps_.size() && at.time_s > gaps_[next].begin_s) continue;
@@ -61,7 +62,7 @@ void ReportPage::line_between_gaps(const std::vector<TimedPoint>& points, const 
 
 namespace {
 
-// In the order of Untracked; the last: of a table of tracks that was given.
+// In the order of Untracked. The last line is for a given tracks.csv.
 constexpr std::array<const char*, 6> kUntrackedLines = {
     "whose picture is missing or could not be decoded",
     "outside the telemetry's time span, or of no use to the first look at the video",
@@ -80,7 +81,7 @@ std::vector<std::string> unused_frames(const ReportPage& page) {
   for (const CalibrationObservation& seen : page.report().input.observations) {
     observed.insert(seen.frame);
   }
-  // By Untracked; the last: nobody knows.
+  // Counts by Untracked. The last: no reason is known.
   std::array<int, kUntrackedLines.size()> without_points{};
   int left_out = 0;
   const auto& untracked = page.report().untracked;
@@ -91,7 +92,7 @@ std::vector<std::string> unused_frames(const ReportPage& page) {
                                    : static_cast<std::size_t>(why->second);
   };
   for (const CalibrationFrame& frame : page.report().input.frames) {
-    // Those without a stamp and those named before are told of with the exclusions.
+    // Skip used frames. The exclusions report frames without a time stamp and repeated frames.
     if (!std::isfinite(frame.stamp_s) || !known.insert(frame.frame).second) continue;
     ++(observed.count(frame.frame) != 0 ? left_out : without_points[line_of(frame.frame)]);
   }

@@ -1,4 +1,4 @@
-// The report's sections on where the camera went: the trajectory, the clocks, the landmarks.
+// The report's sections on the motion of the camera: trajectory, clocks, landmarks.
 
 #include <cmath>
 #include <cstdint>
@@ -36,7 +36,8 @@ void trajectory(ReportPage& page) {
     std::vector<PlotPoint> bad;
     std::vector<double> magnitudes;
     for (const TelemetryResidual& residual : page.result().telemetry_residuals) {
-      // The error is of the measured angle, scale times the true one, whatever the wrapping.
+      // The error is that of the measured angle, which is scale times the true one; wrapping does
+      // not matter.
       const double error = residual.error_rad[axis];
       if (!std::isfinite(error)) continue;
       const double time = residual.time_s - page.start_s();
@@ -106,7 +107,7 @@ void timing(ReportPage& page) {
   std::vector<PlotPoint> telemetry;
   std::optional<std::size_t> shown;
   for (const TelemetryResidual& residual : page.result().telemetry_residuals) {
-    // A change of a coarse reading stands behind its sample, and is no stamp.
+    // A second residual of the same sample is a change of a coarse reading, not a time stamp.
     if (shown == residual.sample) continue;
     shown = residual.sample;
     const double line = residual.time_s + page.result().calibration.clock_offset;
@@ -148,7 +149,8 @@ void landmarks(ReportPage& page) {
   for (const FrameResult& frame : page.result().frames) {
     const Vector3<double> axis = R_base_from_camera(mechanics, frame.angle).col(2);
     path.push_back({frame.time_s - page.start_s(), place(axis)});
-    reference = path.back().point.x / kDegrees;  // follows the camera around
+    // Keeps the azimuth continuous beyond +-180 degrees.
+    reference = path.back().point.x / kDegrees;
   }
   double low_x = path.front().point.x;
   double high_x = low_x;
@@ -172,7 +174,7 @@ void landmarks(ReportPage& page) {
   }
   widen(&low_x, &high_x);
   widen(&low_y, &high_y);
-  // The same scale both ways, in a plane of bearable height.
+  // Use the same scale for both axes, with a limited height of the plot.
   const double plane = kWide_px - SvgPlot::kLeft - SvgPlot::kRight;
   const double plane_height = std::clamp(plane * (high_y - low_y) / (high_x - low_x), 180.0, 560.0);
   const double scale = std::min(plane / (high_x - low_x), plane_height / (high_y - low_y));

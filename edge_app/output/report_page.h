@@ -1,7 +1,7 @@
 #pragma once
-// ReportPage: the page of report.html while it is written, and what its sections share: sizes, units, the time axis.
-// Sections are free functions that add to it, in the order in which they are read.
-// Internal to calibration_report.h. Allocates.
+// ReportPage: report.html while it is being written, and what its sections share: sizes, units, the
+// time axis. Sections are free functions that append to it, in reading order. Internal to
+// calibration_report.h. Allocates.
 
 #include <fmt/format.h>
 
@@ -40,23 +40,23 @@ class ReportPage {
   void add(fmt::format_string<Values...> format, Values&&... values) {
     body_ += fmt::format(format, std::forward<Values>(values)...);
   }
-  // caption is HTML; label what the plot shows, for those who cannot see it.
+  // caption: HTML; label: text for readers who cannot see the plot.
   void figure(const std::string& caption, const SvgPlot& plot, const std::string& label) {
     body_ += html_figure(caption, plot.svg(label));
   }
 
   [[nodiscard]] const CalibrationReportInput& report() const { return report_; }
   [[nodiscard]] const CalibrationResult& result() const { return report_.result; }
-  // Of the first frame, image clock: times are shown since then.
+  // Time of the first frame, image clock. The page shows times relative to it.
   [[nodiscard]] double start_s() const { return start_s_; }
-  // Spans of time between two frames in which no frame was used, since start_s().
+  // Times without used frames, relative to start_s().
   [[nodiscard]] const std::vector<Span>& gaps() const { return gaps_; }
-  // Shades the gaps of a plot over time; what its caption says of that.
+  // Shades the gaps in a plot over time. gap_note(): the text for its caption.
   void shade_gaps(SvgPlot* plot) const;
   [[nodiscard]] std::string gap_note() const {
     return gaps_.empty() ? "" : "; grey columns: no frame was used";
   }
-  // A line through points in order of time, cut where they lie in a gap or on both sides of one.
+  // Draws a line through points, which must be in order of time. The line is interrupted at gaps.
   void line_between_gaps(const std::vector<TimedPoint>& points, const char* colour,
                          SvgPlot* plot) const;
   [[nodiscard]] PlotAxis time_axis() const {
@@ -64,7 +64,7 @@ class ReportPage {
     return {spline.begin_s() - start_s_, spline.end_s() - start_s_,
             "time since the first frame, s"};
   }
-  // px, as the residuals have it.
+  // px, sigma of the observation, scaled to the spread of the residuals.
   [[nodiscard]] double pixel_sigma(const ObservationResidual& residual) const {
     return report_.input.observations[residual.observation].sigma_px *
            result().quality.pixel_sigma_ratio;
@@ -78,16 +78,16 @@ class ReportPage {
   std::string body_;
 };
 
-// Which frames were not used and why, a line for each reason. report_frames.cpp
+// Which frames were not used, with a line for each reason. In report_frames.cpp.
 std::vector<std::string> unused_frames(const ReportPage& page);
-// report_residuals.cpp
+// In report_residuals.cpp.
 void residuals(ReportPage& page);
-// report_motion.cpp
+// In report_motion.cpp.
 void trajectory(ReportPage& page);
 void timing(ReportPage& page);
 void landmarks(ReportPage& page);
 
-// A symmetric range that shows `quantile` of the magnitudes, with some air.
+// A symmetric range that shows `quantile` of the magnitudes, with a margin.
 inline double symmetric_range(std::vector<double> magnitudes, double quantile) {
   if (magnitudes.empty()) return 1;
   const auto at = magnitudes.begin() + static_cast<std::ptrdiff_t>(
@@ -96,7 +96,7 @@ inline double symmetric_range(std::vector<double> magnitudes, double quantile) {
   return std::max(1.15 * *at, 1e-9);
 }
 
-// low and high with a little air; never empty.
+// Widens the range by a margin, so that it is never empty.
 inline void widen(double* low, double* high) {
   const double air = std::max(0.05 * (*high - *low), 1e-6);
   *low -= air;

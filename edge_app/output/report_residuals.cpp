@@ -21,7 +21,7 @@ void residuals_over_time(ReportPage& page) {
     const CalibrationObservation& seen = page.report().input.observations[residual.observation];
     const auto frame = time_of.find(seen.frame);
     if (frame == time_of.end()) continue;
-    // At the time of its row.
+    // The exposure time of its row.
     const double time = frame->second + seen.v_px * page.result().calibration.line_delay;
     for (int i = 0; i < 2; ++i) {
       (residual.outlier ? bad : good)[i].push_back({time, residual.error_px[i]});
@@ -58,7 +58,7 @@ void residuals_over_image(ReportPage& page) {
       static_cast<int>(std::lround(kColumns * static_cast<double>(height) / width)), 1, 48);
   struct Cell {
     Vector2<double> sum = Vector2<double>::Zero();
-    double squares = 0;  // in sigmas
+    double squares = 0;  // in units of sigma^2
     int count = 0;
   };
   std::vector<Cell> cells(static_cast<std::size_t>(kColumns * rows));
@@ -72,7 +72,7 @@ void residuals_over_image(ReportPage& page) {
     cell.squares += residual.error_px.squaredNorm() / std::pow(page.pixel_sigma(residual), 2);
     ++cell.count;
   }
-  constexpr int kFewest = 5;  // that make a mean
+  constexpr int kFewest = 5;  // residuals for a mean
   double longest = 0;
   for (const Cell& cell : cells) {
     if (cell.count >= kFewest) longest = std::max(longest, cell.sum.norm() / cell.count);

@@ -1,5 +1,5 @@
 #pragma once
-// What localization by the scene map has done, as JSON: the answer of /api/v1/map.
+// The state of the localization by the scene map as JSON: the answer of /api/v1/map.
 
 #include <nlohmann/json_fwd.hpp>
 
@@ -7,7 +7,7 @@
 
 namespace alidade {
 
-// now_s: host time, from which ages are counted.
+// now_s: host time; ages are relative to it.
 [[nodiscard]] nlohmann::ordered_json scene_json(const SceneReport& report, double now_s);
 
 }  // namespace alidade

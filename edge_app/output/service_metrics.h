@@ -1,6 +1,7 @@
 #pragma once
-// What `GET /metrics` answers: frames, losses, latency by stage, mode, telemetry's age, clock, calibration with its age
-// and sigmas, clients; in the text format of metrics.h, with base units in the names. Any thread; allocates.
+// The answer of `GET /metrics`: frames, losses, latency by stage, mode, age of telemetry, clock,
+// calibration with its age and sigmas, clients. Text format of metrics.h, with base units in the
+// names. Any thread; allocates.
 
 #include <string>
 

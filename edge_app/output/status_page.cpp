@@ -14,7 +14,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// A frame of a slow camera comes within it.
+// Long enough for the next frame of a slow camera.
 constexpr double kPatienceS = 1;
 constexpr std::chrono::milliseconds kWithoutWaiting{0};
 
@@ -63,7 +63,7 @@ std::optional<ServerResponse> overlay(ImageTap* tap, const ServerRequest& reques
   return response;
 }
 
-// To a thousandth of a pixel.
+// Rounds to a thousandth of a pixel.
 double rounded(float px) { return std::round(1000.0 * px) / 1000; }
 
 }  // namespace

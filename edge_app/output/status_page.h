@@ -1,11 +1,14 @@
 #pragma once
 // The status page of `alidade run`: status_page.html at GET /, and the live image that it shows.
 //
-//   GET /                   open: it tells nothing of the camera; what it shows it asks for itself, with the token
-//   GET /api/v1/image     a JPEG at most 480 px wide of a frame of now; its number is in X-Alidade-Frame
-//   GET /api/v1/overlay     what was seen in that frame (?frame=N, one of the last 16 that were shown), or in one of now
+//   GET /                   needs no token: the page itself says nothing of the camera. It asks for
+//                           what it shows, with the token
+//   GET /api/v1/picture     a JPEG of a current frame, at most 480 px wide; its frame number is in
+//                           X-Alidade-Frame
+//   GET /api/v1/overlay     the landmarks of a frame (?frame=N, one of the last 16 shown), or of a
+//                           current frame
 //
-// The page may run its own style and script, load nothing from elsewhere and be framed by nobody.
+// The policy allows the page's own style and script, nothing from elsewhere, and no framing.
 
 #include <string>
 
@@ -14,15 +17,15 @@
 
 namespace alidade {
 
-// Made from status_page.html when the program is built.
+// The build makes these from status_page.html.
 extern const char* const kStatusPage;
 extern const char* const kStatusPagePolicy;
 
-// Borrows *tap until the server has stopped.
+// *tap is used until the server has stopped.
 void add_status_page(HttpServer* server, ImageTap* tap);
 
-// {"frame", "width", "height", "scale", "landmarks": [{"u", "v", "du", "dv", "used"}], "points": [[u, v]]}, all px of
-// the frame; a pixel of the JPEG is scale x scale of its pixels.
+// {"frame", "width", "height", "scale", "landmarks": [{"u", "v", "du", "dv", "used"}],
+//  "points": [[u, v]]}, in px of the frame. A pixel of the JPEG is scale x scale px of the frame.
 [[nodiscard]] std::string overlay_json(const LiveImage& image);
 
 }  // namespace alidade

@@ -17,7 +17,8 @@ struct Ticks {
   int decimals = 0;
 };
 
-// An axis is read from the distance of two labels; one with a label in its middle needs one on either side.
+// Two labels are enough to read an axis. If one of them may be in the middle, three are needed, so
+// that there is one on either side.
 constexpr std::size_t kFewestTicks = 3;
 
 std::vector<double> multiples(double step, double low, double high) {
@@ -42,7 +43,7 @@ Ticks round_ticks(double low, double high, int wanted) {
 }
 
 std::string tick_label(double value, int decimals) {
-  constexpr int kMostDecimals = 5;  // that the margin has room for
+  constexpr int kMostDecimals = 5;  // the margin has no room for more
   const double unit = std::pow(10, decimals);
   std::string text = decimals > kMostDecimals ? fmt::format("{:g}", std::round(value * unit) / unit)
                                               : fmt::format("{:.{}f}", value, decimals);
@@ -93,7 +94,7 @@ double SvgPlot::py(double y) const {
 }
 
 void SvgPlot::dots(const std::vector<PlotPoint>& points, const char* colour, double diameter) {
-  std::set<std::pair<int, int>> places;  // half pixels
+  std::set<std::pair<int, int>> places;  // in half pixels
   for (const PlotPoint& point : points) {
     if (!std::isfinite(point.x) || !std::isfinite(point.y)) continue;
     if (point.x < x_.low || point.x > x_.high) continue;

@@ -1,16 +1,17 @@
 #pragma once
-// SvgPlot: one diagram as an <svg> element for a page that defines the colours (class names a, b, bad,
-// soft as `--a` etc.). Axes with round ticks, names with units; series are drawn in the order in which
-// they are added. Points beyond the vertical range stand on its edge; points that cover each other are
-// drawn once, and of very many each n-th. A plot to which no dot, line or rectangle was added says "no data". The element's
-// class is `wide` or `half`, for narrow screens. Pure; allocates.
+// SvgPlot: one diagram as an <svg> element. The page defines the colours of the classes a, b, bad
+// and soft (`--a` and so on). Axes have round ticks and labels with units. Series are drawn in the
+// order in which they are added. Points beyond the vertical range are drawn at its edge. Points
+// that cover each other are drawn once; of very many points only each n-th is drawn. A plot without
+// dots, lines and rectangles says "no data". The element's class is `wide` or `half`, for narrow
+// screens. Pure; allocates.
 
 #include <string>
 #include <vector>
 
 namespace alidade {
 
-// &, <, > and quotes as entities: for whatever comes from a file or a command line.
+// Writes &, <, > and quotes as entities, for text from files or the command line.
 std::string escape_html(const std::string& text);
 
 struct PlotPoint {
@@ -26,34 +27,34 @@ struct PlotAxis {
 
 class SvgPlot {
  public:
-  // Size in px. Axes must be finite with low < high. y_down: images, whose rows run downwards.
+  // Size in px. Axes must be finite with low < high. y_down: y grows downwards, as in images.
   SvgPlot(int width, int height, PlotAxis x, PlotAxis y, bool y_down = false);
 
   void dots(const std::vector<PlotPoint>& points, const char* colour, double diameter = 2.2);
   void line(const std::vector<PlotPoint>& points, const char* colour);
   void arrow(const PlotPoint& from, const PlotPoint& to);
-  // From `low` to `high` over the whole width.
+  // A grey band from `low` to `high` over the whole width.
   void band(double low, double high);
-  // From `from` to `to` over the whole height: where there is nothing to show.
+  // Shades `from` to `to` over the whole height, where there are no data.
   void shade(double from, double to);
   void level(double y);
   void rectangle(const PlotPoint& from, const PlotPoint& to, const char* colour, double opacity);
   // Short strokes on the x axis.
   void ticks(const std::vector<double>& x, const char* colour);
 
-  // The whole element. label: for readers who cannot see it.
+  // The whole element. label: text for readers who cannot see the plot.
   [[nodiscard]] std::string svg(const std::string& label) const;
 
-  // Size of one unit of the axes in px.
+  // px for one unit of the axis.
   [[nodiscard]] double x_scale() const;
   [[nodiscard]] double y_scale() const;
 
-  // Room for the axes; the rest of the size is the plane.
+  // px, margins for the axes; the rest is the plot area.
   static constexpr int kLeft = 66;
   static constexpr int kRight = 14;
   static constexpr int kTop = 10;
   static constexpr int kBottom = 44;
-  static constexpr int kWide = 600;  // from here on a plot is `wide`
+  static constexpr int kWide = 600;  // px; from this width on the class is `wide`
 
  private:
   [[nodiscard]] double px(double x) const;

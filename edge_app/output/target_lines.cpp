@@ -9,7 +9,7 @@ namespace alidade {
 void TargetLines::take(const TargetsState& state) {
   std::string line = targets_line(state);
   if (file_ != nullptr && !file_failed_ && !file_->write(line)) {
-    // Records go on.
+    // A failure here does not end the records.
     file_failed_ = true;
     spdlog::error("{}; no more targets are written there", file_->error());
   }

@@ -1,6 +1,6 @@
 #pragma once
-// TargetLines: targets after each frame as a line of JSON, made once: the newest for the event streams, all for a file.
-// take() is called on the thread of the targets and waits for no reader.
+// TargetLines: makes one line of JSON of the targets after each frame. Event streams get the newest
+// line, a file gets all. The targets' thread calls take(), which waits for no reader.
 
 #include <cstdint>
 #include <functional>
@@ -17,17 +17,17 @@ namespace alidade {
 class TargetLines {
  public:
   struct Newest {
-    std::int64_t id = 0;                      // counted from 1; 0: there is none
+    std::int64_t id = 0;                      // from 1; 0: none yet
     std::shared_ptr<const std::string> json;  // without line feed
   };
 
-  // file: borrowed; null: none.
+  // Does not own `file`; null: no file.
   explicit TargetLines(LineWriter* file) : file_(file) {}
 
   void take(const TargetsState& state);
   [[nodiscard]] Newest newest() const;
 
-  // Before the first line. Called by take() when there is something new; must not wait.
+  // Must be called before the first line. take() calls on_news for each new line; it must not wait.
   void set_on_news(std::function<void()> on_news) { on_news_ = std::move(on_news); }
 
  private:

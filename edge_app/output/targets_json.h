@@ -1,5 +1,6 @@
 #pragma once
-// Targets as JSON: the answer of GET /api/v1/targets, the event `targets` and a line of output.targets. Names and units: openapi.yaml.
+// Targets as JSON: the answer of GET /api/v1/targets, the event `targets` and a line of
+// output.targets. Names and units: openapi.yaml.
 
 #include <nlohmann/json_fwd.hpp>
 #include <string>
@@ -8,14 +9,14 @@
 
 namespace alidade {
 
-// In the frame of this record, which has a time and an orientation.
+// The targets in the frame of this record, which must have a time and an orientation.
 [[nodiscard]] nlohmann::ordered_json targets_json(const TargetsState& state,
                                                   const OrientationRecord& record);
 
-// In the newest frame that was taken; ends with a line feed.
+// The targets in the newest frame of detections that was accepted. Ends with a line feed.
 [[nodiscard]] std::string targets_line(const TargetsState& state);
 
-// What became of frames and boxes.
+// How many frames and boxes were accepted, and how many were refused for which reason.
 [[nodiscard]] nlohmann::ordered_json target_counters_json(const TargetCounters& counters);
 
 }  // namespace alidade

@@ -19,7 +19,7 @@ namespace {
 
 constexpr std::size_t kLongestLine = 2048;  // bytes that most lines do not exceed
 
-// One line, in memory of its own; what has no value is said by the word that the kind of line has for that.
+// One line in memory of its own. nothing: how this kind of line writes a missing value.
 class Text {
  public:
   explicit Text(std::string_view nothing) : nothing_(nothing) { text_.reserve(kLongestLine); }
@@ -30,12 +30,12 @@ class Text {
   void put_value(std::int64_t value) {
     fmt::format_to(std::back_inserter(text_), FMT_COMPILE("{}"), value);
   }
-  // What is not finite has no value.
+  // A number that is not finite is written as a missing value.
   void put_value(double value) {
     if (!std::isfinite(value)) return put(nothing_);
     const std::size_t begin = text_.size();
     fmt::format_to(std::back_inserter(text_), FMT_COMPILE("{}"), value);
-    // A number that could be a whole one is still seen to be a measured one.
+    // A whole number gets ".0", so that the field is always a floating-point number.
     if (text_.find_first_of(".e", begin) == std::string::npos) put(".0");
   }
   template <class T>
@@ -44,7 +44,7 @@ class Text {
   }
 
  protected:
-  // Replaces the comma behind the last field.
+  // Replaces the comma after the last field.
   void end(std::string_view by) {
     text_.pop_back();
     put(by);
@@ -105,7 +105,7 @@ class JsonLine : public Text {
     put(name);
     put("\":");
   }
-  // Our own words have nothing in them that JSON would want changed.
+  // These texts are the program's own and need no escapes in JSON.
   void put_json(std::string_view word) {
     put('"');
     put(word);

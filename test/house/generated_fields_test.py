@@ -9,7 +9,7 @@ import unittest
 
 TOP = pathlib.Path(__file__).resolve().parents[2]
 FILES = ("scripts/generate-fields", ".clang-format", "edge_app/record/record_fields.yaml", "edge_app/record/record_fields.h",
-         "edge_app/output/openapi.yaml", "edge_app/README.md", "ros_wrapper/alidade_msgs/msg/FrameOrientation.msg",
+         "edge_app/output/openapi.yaml", "docs/records.md", "ros_wrapper/alidade_msgs/msg/FrameOrientation.msg",
          "ros_wrapper/alidade_ros/include/alidade_ros/record_fields.h", "ros_wrapper/alidade_ros/src/record_fields.cpp")
 NEW = """
 - name: sun_rad

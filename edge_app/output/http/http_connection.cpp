@@ -22,15 +22,15 @@ namespace {
 
 namespace asio = boost::asio;
 
-constexpr double kAskAgainS = 0.01;  // a handler that has no answer yet
-constexpr double kSayAgainS = 0.5;   // an endless answer that has nothing to say
+constexpr double kAskAgainS = 0.01;  // pause if a handler has no answer yet
+constexpr double kSayAgainS = 0.5;   // pause if an endless answer has nothing to send
 constexpr double kCancelAgainS = 0.05;
 constexpr int kCancelTimes = 5;
-constexpr double kWholeAnswerS = 60;  // the longest that one finite answer may take
-constexpr double kLingerS = 1;        // for what a client is still sending after its answer
+constexpr double kWholeAnswerS = 60;  // longest time for a finite answer
+constexpr double kLingerS = 1;        // for bytes that a client still sends after its answer
 constexpr std::size_t kLingerBytes = std::size_t{256} << 10;
 constexpr std::size_t kLingerPiece = 4096;
-// As it stands, for when memory is short.
+// Constant, so that it can be sent when memory is short.
 constexpr std::string_view kTooMany =
     "HTTP/1.1 503 Service Unavailable\r\nContent-Type: application/json\r\nRetry-After: 1\r\n"
     "Content-Length: 33\r\nConnection: close\r\n\r\n{\"error\":\"too many connections\"}\n";
@@ -60,7 +60,7 @@ std::string head_of(const ServerResponse& response) {
 
 void log_failure(const char* what) { spdlog::error("HTTP: {}", what); }
 
-// What a handler throws is told to the log, not to the client.
+// An exception of a handler goes to the log, not to the client.
 std::optional<ServerResponse> call(const HttpHandler& handler, const ServerRequest& request) {
   try {
     return handler(request);
@@ -267,7 +267,7 @@ void HttpConnection::give_way() {
   drop();
 }
 
-// Lets a client that is still sending read its answer: closing at once would reset the connection.
+// Lets a client that is still sending read its answer. Closing at once would reset the connection.
 void HttpConnection::linger() {
   if (!transport_.has_tls()) return linger_plainly();
   within(kLingerS, &HttpConnection::drop);
@@ -276,7 +276,7 @@ void HttpConnection::linger() {
   });
 }
 
-// What still comes is discarded as it stands.
+// Discards what still comes, without TLS.
 void HttpConnection::linger_plainly() {
   Error error;
   transport_.socket().shutdown(asio::ip::tcp::socket::shutdown_send, error);
@@ -339,7 +339,7 @@ void HttpConnection::within(double time_s, Step late) {
   timer_.expires_after(
       std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(time_s)));
   timer_.async_wait([self = shared_from_this(), late](const Error& error) {
-    // One that was set anew has not expired, even if this call was already on its way.
+    // If the deadline was set anew while this call was under way, it has not expired.
     if (error || self->timer_.expiry() > Clock::now()) return;
     self->guarded([&] { ((*self).*late)(); });
   });
@@ -349,7 +349,8 @@ void HttpConnection::without_deadline() {
   timer_.expires_at(asio::steady_timer::time_point::max());
 }
 
-// Again and again until the read says so: one that pauses between two pieces is not met. One that failed never says so.
+// Cancels the read repeatedly until it ends: a cancellation does not reach a read that pauses
+// between two pieces. A read that the library lost never ends; then the connection is dropped.
 void HttpConnection::stop_reading() {
   if (++cancelled_ > kCancelTimes) return drop();
   late_ = true;
@@ -363,7 +364,7 @@ void HttpConnection::drop_stalled() {
   drop();
 }
 
-// Ends whatever is under way, and with it the last that keeps this alive.
+// Ends all pending operations, and with them the last references that keep this object alive.
 void HttpConnection::drop() {
   const auto keep = shared_from_this();
   ended_ = true;

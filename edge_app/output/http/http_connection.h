@@ -1,12 +1,13 @@
 #pragma once
-// HttpConnection: one client, from its first byte to the last that it takes. Stage after stage, one operation under way
-// and one deadline at a time:
+// HttpConnection: one client, from its first byte to the last byte that it takes. It goes through
+// these stages, with one operation and one deadline at a time:
 //
 //   head --> gate --> body --> handler --> answer --> linger --> closed
 //
-// A refusal is an answer, too. An endless answer is asked for more whenever all was taken, until the client is gone.
-// Network thread but for the handler, which runs on a handlers' thread while the connection does nothing else. What is
-// thrown in a stage, where memory has run out, ends this connection and is passed on.
+// A refusal is an answer, too. An endless answer is asked for more whenever the client has taken
+// everything. All runs on the network thread, except the handler: it runs on a handlers' thread
+// while the connection does nothing else. An exception in a stage, as when memory has run out, ends
+// this connection and is passed on.
 
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/steady_timer.hpp>
@@ -27,7 +28,7 @@ namespace alidade {
 
 class HttpConnection;
 
-// The places that connections hold: each one, until it ends.
+// The places of connections. Each connection holds one until it ends.
 struct HttpPlaces {
   explicit HttpPlaces(const HttpLimits& limits)
       : strangers(limits.max_strangers),
@@ -36,10 +37,10 @@ struct HttpPlaces {
 
   FairPlaces<HttpConnection> strangers;
   FairPlaces<HttpConnection> with_token;
-  FairPlaces<HttpConnection> streams;  // those whose answer is endless
+  FairPlaces<HttpConnection> streams;  // connections with an endless answer
 };
 
-// What the connections of a server share.
+// Shared by the connections of a server.
 struct HttpService {
   const HttpLimits& limits;
   HttpGate& gate;
@@ -57,17 +58,17 @@ class HttpConnection final : public std::enable_shared_from_this<HttpConnection>
   HttpConnection(const HttpConnection&) = delete;
   HttpConnection& operator=(const HttpConnection&) = delete;
 
-  // Once; it keeps itself alive from then on.
+  // Call once. From then on the connection keeps itself alive.
   void begin();
-  // An endless answer may have more to say.
+  // An endless answer may have more to send.
   void wake();
-  // Somebody else takes its place: says so, if nothing was said yet, and ends.
+  // Another client takes this place. Sends 503 if nothing was sent yet, and ends.
   void give_way();
 
   [[nodiscard]] const HttpClient& client() const { return client_; }
-  // Asks the handler; on any thread.
+  // Calls the handler; on a handlers' thread.
   void work() noexcept;
-  // Behind it.
+  // Call after work(), on the network thread.
   void take_answer();
 
  private:
@@ -87,19 +88,19 @@ class HttpConnection final : public std::enable_shared_from_this<HttpConnection>
   void linger_plainly();
   void discard();
 
-  // Sends, then goes on with the step.
+  // Sends the text, then goes on with step `then`.
   void send(std::string text, Step then);
   void send_rest();
   void take_sent(std::size_t count);
 
-  // Of the oldest of whoever has most, where all are taken.
+  // If all places are taken, the oldest connection of the address that holds most gives way.
   void take_place(FairPlaces<HttpConnection>* places);
   void leave_place();
 
   template <typename Stage>
   void guarded(Stage stage);
 
-  // Calls the step unless the next deadline is set before; one at a time.
+  // Sets the only deadline: calls step `late` after time_s, unless another deadline is set before.
   void within(double time_s, Step late);
   void without_deadline();
   void stop_reading();
@@ -114,24 +115,26 @@ class HttpConnection final : public std::enable_shared_from_this<HttpConnection>
   bool spoke_ = false;  // something was sent
   bool ended_ = false;
 
-  std::string received_;  // the head, and what came with it
-  bool late_ = false;     // a read was ended by its deadline
-  int cancelled_ = 0;     // how often that was tried
+  std::string received_;  // the head and bytes that came with it
+  bool late_ = false;     // the deadline has ended a read
+  int cancelled_ = 0;     // how often the read was cancelled
   HttpHead head_;
   const HttpRoute* route_ = nullptr;
   ServerRequest request_;
-  bool body_to_come_ = false;  // when the head was there: then the request costs once it has
-  std::size_t body_came_ = 0;
-  double complete_s_ = 0;  // when the request was
+  // The body was incomplete when the head was complete. Then the request counts when the body is
+  // complete.
+  bool body_to_come_ = false;
+  std::size_t body_came_ = 0;  // bytes
+  double complete_s_ = 0;      // when the request was complete
   std::optional<ServerResponse> response_;
-  bool failed_ = false;  // there can be no response
+  bool failed_ = false;  // no response can be made
 
   std::string sending_;
   std::size_t sent_ = 0;
   Step after_sending_ = nullptr;
   double answer_deadline_s_ = 0;
   std::unique_ptr<HttpStream> stream_;
-  bool silent_ = false;  // an endless answer that has nothing to say
+  bool silent_ = false;  // the endless answer has nothing to send
   std::size_t discarded_ = 0;
 };
 

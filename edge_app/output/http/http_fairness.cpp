@@ -5,7 +5,7 @@
 namespace alidade {
 namespace {
 
-constexpr double kForgottenS = 1;  // without a request; by then an account is full again
+constexpr double kForgottenS = 1;  // without a request; after that an account is full again
 constexpr double kSweepS = 0.1;
 
 }  // namespace

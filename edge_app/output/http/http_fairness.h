@@ -1,6 +1,6 @@
 #pragma once
-// Fairness among the addresses that clients come from: what there is for all is shared alike by those that want some.
-// Network thread.
+// Fairness among the addresses of clients: a resource is shared equally by the addresses that want
+// some of it. For the network thread.
 
 #include <algorithm>
 #include <boost/asio/ip/address.hpp>
@@ -10,13 +10,15 @@
 
 namespace alidade {
 
-// Whom a client is counted for: its IPv4 address, or the /64 of an IPv6 one, all of which one machine may use.
+// The address under which a client is counted: its IPv4 address, or the /64 of its IPv6 address, as
+// one machine may use all of a /64.
 using HttpAddress = boost::asio::ip::address_v6;
 [[nodiscard]] HttpAddress http_address(const boost::asio::ip::address& peer);
 
-// Requests a second of all addresses together. Each that asked within the last second has the same share of them, at
-// most a second's worth at once, and one at least; beyond it, what others leave, while more than half of a second's worth is
-// left. Of more addresses than are kept apart the rest has one share.
+// Limits the requests a second of all addresses together. Each address that asked within the last
+// second has the same share: at most the share of one second at once, and at least one request. An
+// address may use more while others leave more than half of a second's requests. Beyond
+// kMaxAddresses, all further addresses have one share together.
 class FairRate {
  public:
   explicit FairRate(double per_s);
@@ -35,11 +37,12 @@ class FairRate {
 
   const double per_s_;
   double swept_s_ = 0;
-  Account all_;  // together
+  Account all_;  // of all addresses together
   std::map<HttpAddress, Account> accounts_;
 };
 
-// Addresses that did something within the last ten minutes. Of more than are kept the one that did it longest ago goes.
+// The addresses that did something within the last ten minutes. At most kMost; then the one whose
+// action is longest ago is forgotten.
 class RecentAddresses {
  public:
   void add(const HttpAddress& address, double now_s);
@@ -52,7 +55,8 @@ class RecentAddresses {
   std::map<HttpAddress, double> last_s_;
 };
 
-// So many places, held by the address and in the order in which they were taken. Nothing is allocated after construction.
+// A number of places, in the order in which they were taken, each with the address that holds it.
+// Does not allocate after construction.
 template <typename Holder>
 class FairPlaces {
  public:
@@ -63,7 +67,8 @@ class FairPlaces {
 
   [[nodiscard]] bool full() const { return places_.size() >= most_; }
 
-  // Of the address that holds the most, of several the one with the oldest. Null: there is none.
+  // The oldest place of the address that holds the most. If several addresses hold equally many,
+  // the oldest place of all of these. Null: there are no places taken.
   [[nodiscard]] Holder* oldest_of_the_greediest() const {
     const std::size_t most = largest_share();
     const auto found = std::find_if(places_.begin(), places_.end(), [&](const Place& place) {
@@ -72,8 +77,9 @@ class FairPlaces {
     return found == places_.end() ? nullptr : found->holder;
   }
 
-  // Whose leaving would leave nobody worse off than the newcomer's address: the newest of the address that
-  // holds the most, if that is at least two more. Null: there is none.
+  // The place that may be taken away for the newcomer: the newest of the address that holds the
+  // most, if that holds at least two more than the newcomer's address. So nobody ends with fewer
+  // places than the newcomer. Null: there is none.
   [[nodiscard]] Holder* one_too_many(const HttpAddress& newcomer) const {
     const std::size_t most = largest_share();
     if (most < held_by(newcomer) + 2) return nullptr;
@@ -83,7 +89,7 @@ class FairPlaces {
     return found->holder;
   }
 
-  // Only where it is not full.
+  // Only if not full().
   void take(Holder* holder, const HttpAddress& address) {
     places_.push_back({holder, address});
     const auto share = share_of(address);
@@ -135,7 +141,7 @@ class FairPlaces {
   }
 
   const std::size_t most_;
-  std::vector<Place> places_;  // the oldest first
+  std::vector<Place> places_;  // oldest first
   std::vector<Share> shares_;
 };
 

@@ -84,7 +84,8 @@ std::optional<ServerResponse> HttpGate::check(const HttpHead& head, double now_s
                                               const HttpClient& client, const HttpRoute** route) {
   if (!host_is_trusted(head))
     return http_error(403, "the Host header names another machine; use an address, or set a token");
-  // A browser would not let that page see the answer; asking costs us work all the same, and streams their places.
+  // A browser would not let that page read the answer. But each request costs work, and each stream
+  // a place.
   if (!origin_is_own(head) || head.from_other_site)
     return http_error(403, "a page of another site may not ask this");
   const auto path = routes_.find(head.path);
@@ -119,7 +120,8 @@ std::optional<ServerResponse> HttpGate::check(const HttpHead& head, double now_s
                                "Bearer error=\"insufficient_scope\", scope=\"control\"");
     return error;
   }
-  // A browser that another site's page leads here sends no Origin, and over plain HTTP not even Sec-Fetch-Site.
+  // A browser that loads this for a page of another site may send no Origin, and over plain HTTP
+  // not even Sec-Fetch-Site.
   if (access == HttpAccess::kStream && !tokens_.any() && head.of_browser &&
       !shows_ticket(head, now_s))
     return http_error(
@@ -135,13 +137,15 @@ bool HttpGate::shows_ticket(const HttpHead& head, double now_s) {
   });
 }
 
-// Behind a proxy with TLS the page is of https; with a token it is no matter who else has that name.
+// Behind a proxy with TLS the page's origin is https. Without TLS here that is accepted only with a
+// token, as then it does not matter who else may have that name.
 bool HttpGate::origin_is_own(const HttpHead& head) const {
   return head.origin.empty() || (!has_tls_ && head.origin == "http://" + head.host) ||
          ((has_tls_ || tokens_.any()) && head.origin == "https://" + head.host);
 }
 
-// A token cannot be had by a page of another site, whatever name that site takes; nor has that a certificate for its own name here.
+// Against DNS rebinding: a page of another site whose name points to this machine. Such a page has
+// no token. With TLS the certificate here does not fit its name.
 bool HttpGate::host_is_trusted(const HttpHead& head) const {
   const std::string host = host_of(head.host);
   return has_tls_ || tokens_.any() || head.host.empty() || host == "localhost" ||

@@ -1,5 +1,6 @@
 #pragma once
-// HttpGate: who may ask what. All that can be decided from a request's head, before its body is read.
+// HttpGate: who may ask what. It decides everything that follows from a request's head, before the
+// body is read.
 
 #include <atomic>
 #include <cstddef>
@@ -18,15 +19,15 @@
 namespace alidade {
 
 enum class HttpAccess {
-  kToken,    // wants a token, if there are any
-  kControl,  // one that may control
-  kStream,   // as kToken; where there are none, what a browser sends must show a ticket
-  kOpen      // never
+  kToken,    // needs a token, if any token is set
+  kControl,  // needs a token that may control, if any token is set
+  kStream,   // as kToken; if no token is set, a browser's request needs a ticket
+  kOpen      // needs no token
 };
 
 struct HttpRoute {
   HttpAccess access = HttpAccess::kToken;
-  std::size_t max_body = 0;  // of a POST
+  std::size_t max_body = 0;  // bytes, of a POST
   HttpHandler handler;
 };
 
@@ -34,12 +35,12 @@ struct HttpCounters {
   std::int64_t requests = 0;
   std::int64_t refused = 0;  // connections and requests beyond a limit
   std::int64_t unauthorized = 0;
-  std::int64_t stalled = 0;      // connections dropped because the client took nothing
+  std::int64_t stalled = 0;      // connections dropped as the client took nothing
   std::int64_t connections = 0;  // now
   std::int64_t streams = 0;      // now
 };
 
-// The same as they are counted: on the network thread, and read by any.
+// HttpCounters while they are counted. The network thread writes; any thread may read.
 struct HttpTally {
   std::atomic<std::int64_t> requests{0};
   std::atomic<std::int64_t> refused{0};
@@ -51,7 +52,8 @@ struct HttpTally {
   [[nodiscard]] HttpCounters now() const;
 };
 
-// Who asks: by address, and whether a token was shown, and what that may do. Where none is set nobody shows one.
+// Who asks: the address, whether it showed a token, and the right of that token. If no token is
+// set, has_token is false.
 struct HttpClient {
   HttpAddress address;
   bool has_token = false;
@@ -62,21 +64,23 @@ class HttpGate {
  public:
   HttpGate(const HttpServerOptions& options, HttpTally* tally);
 
-  // Before the first admit().
+  // Must be called before the first admit().
   void add(const std::string& method, const std::string& path, HttpRoute route);
 
   // Any thread.
   [[nodiscard]] HttpTickets& tickets() { return tickets_; }
 
-  // One thread. Whether a client may begin with TLS: its address's share, apart for those that showed a token lately. Counted
-  // where not.
+  // Network thread. Whether a client may begin a TLS handshake: whether its address has some of its
+  // share left. Addresses that showed a token lately have shares of their own. Refusals are
+  // counted.
   [[nodiscard]] bool may_shake_hands(const HttpAddress& address, double now_s);
 
-  // One thread. The route that answers; null: *refusal is the answer. Says whether the client has the token. A request whose
-  // body is still to come costs nothing yet: then charge() when it has.
+  // Network thread. Returns the route that answers; null: *refusal is the answer. Sets token and
+  // right of *client. A request whose body is still to come is not counted yet; call charge() when
+  // it has come.
   [[nodiscard]] const HttpRoute* admit(const HttpHead& head, double now_s, bool body_to_come,
                                        HttpClient* client, ServerResponse* refusal);
-  // False: the client's share is used up, *refusal is the answer.
+  // Counts a request. False: the client's share is used up, *refusal is the answer.
   [[nodiscard]] bool charge(const HttpClient& client, double now_s, ServerResponse* refusal);
 
  private:

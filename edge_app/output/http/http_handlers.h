@@ -1,7 +1,8 @@
 #pragma once
-// HttpHandlers: the handlers' threads, and who is next: requests with the token first, then of the address that
-// has the fewest waiting, then the oldest. Nothing is allocated between the threads: a hand-over cannot fail.
-// All but serve() and stop() is the network thread's.
+// HttpHandlers: the handlers' threads, and the order of requests: first those with a token, then
+// those of the address with the fewest waiting requests, then the oldest. Nothing is allocated
+// between the threads, so a hand-over cannot fail. All functions except serve() and stop() are for
+// the network thread.
 
 #include <array>
 #include <condition_variable>
@@ -15,28 +16,28 @@ class HttpConnection;
 
 class HttpHandlers {
  public:
-  // So that one long computation does not hold up all others.
+  // Two, so that one long computation does not hold up all others.
   static constexpr int kThreads = 2;
 
-  // done: an eventfd that is written to when a request was answered.
+  // done: an eventfd that is written when a request was answered.
   explicit HttpHandlers(int done) : done_(done) {}
   HttpHandlers(const HttpHandlers&) = delete;
   HttpHandlers& operator=(const HttpHandlers&) = delete;
 
   void ask(std::shared_ptr<HttpConnection> connection);
-  // One that still waits is not asked for any more.
+  // Removes a connection that still waits.
   void forget(const HttpConnection* connection);
-  // Lets those go on whose requests were answered.
+  // Continues the connections whose requests were answered.
   void collect();
 
-  // On kThreads threads, until stop().
+  // Call it on kThreads threads; returns after stop().
   void serve();
   void stop();
-  // Once no thread serves.
+  // Only when no thread serves any more.
   void clear();
 
  private:
-  // What a mutex guards, for so many as are at work.
+  // A list of fixed size for connections at work; guarded by mutex_.
   struct Some {
     std::array<HttpConnection*, kThreads> which{};
     std::size_t count = 0;
@@ -47,7 +48,7 @@ class HttpHandlers {
   [[nodiscard]] Connections::iterator next();
 
   const int done_;
-  Connections waiting_;  // the oldest first
+  Connections waiting_;  // oldest first
   Connections at_work_;
 
   std::mutex mutex_;

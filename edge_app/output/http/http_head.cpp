@@ -25,7 +25,7 @@ int hex_digit(char c) {
   return -1;
 }
 
-// %41 is A; a % before anything else stands for itself. In a query + is a space.
+// "%41" is A. A % that is not followed by two hex digits stays. In a query + is a space.
 std::string decoded(std::string_view text, bool in_query) {
   std::string out;
   for (std::size_t i = 0; i < text.size(); ++i) {
@@ -58,7 +58,7 @@ void parse_query(std::string_view query, HttpHead* head) {
   }
 }
 
-// From the text, as the library only says that it does not like them.
+// Reads them from the text, as the library only reports that they are faulty.
 std::vector<std::string> content_lengths(std::string_view text) {
   constexpr std::string_view kName = "content-length:";
   std::vector<std::string> out;
@@ -73,7 +73,7 @@ std::vector<std::string> content_lengths(std::string_view text) {
   return out;
 }
 
-// Why the length of the body cannot be known. Neither is there then a place where it ends.
+// Why the length of the body is not known. Then the end of the body is not known either.
 std::optional<ServerResponse> length_refusal(const HttpHead& head) {
   if (head.transfer_encoding || head.content_lengths.size() > 1)
     return http_error(411, "the request must tell the length of its body, once");
@@ -96,7 +96,7 @@ std::string_view text_of(const Fields& fields, const char* name) {
   return {value.data(), value.size()};
 }
 
-// Each of them alone is enough: browsers differ, and send fewer over plain HTTP.
+// One of these headers is enough: browsers differ, and send fewer of them over plain HTTP.
 bool is_of_browser(const Fields& fields) {
   using boost::algorithm::istarts_with;
   for (const auto& field : fields) {
@@ -125,7 +125,7 @@ bool parse_http_head(std::string_view text, HttpHead* head, ServerResponse* refu
   *head = HttpHead();
   head->content_lengths = content_lengths(text);
   http::request_parser<http::empty_body> parser;
-  parser.skip(true);  // the body is not its matter
+  parser.skip(true);  // it must not read the body
   parser.header_limit(std::numeric_limits<std::uint32_t>::max());
   boost::beast::error_code error;
   parser.put(boost::asio::const_buffer(text.data(), text.size()), error);

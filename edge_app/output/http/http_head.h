@@ -1,5 +1,5 @@
 #pragma once
-// HttpHead: what the head of a request says, as far as it matters here. Pure: bytes in, value or refusal out.
+// HttpHead: the head of a request, as far as it matters here. Pure: bytes in, value or refusal out.
 
 #include <optional>
 #include <string>
@@ -12,28 +12,29 @@
 namespace alidade {
 
 struct HttpHead {
-  std::string method;                                           // one that RFC 9110 or 5789 names
+  std::string method;                                           // a method of RFC 9110 or 5789
   std::string path;                                             // decoded, without the query
   std::vector<std::pair<std::string, std::string>> parameters;  // of the query, decoded
   std::string host;
   std::string origin;
   std::string authorization;
-  bool of_browser = false;  // it has a header that browsers send, and that no page can take away
-  bool from_other_site = false;              // the browser says so; but for a link that is followed
-  std::vector<std::string> content_lengths;  // as they stand, one a field
+  bool of_browser = false;       // has a header that browsers send and that no page can remove
+  bool from_other_site = false;  // according to the browser; false for a link that is followed
+  std::vector<std::string> content_lengths;  // unparsed, one for each field
   bool transfer_encoding = false;
   bool content_encoding = false;
   bool expects_continue = false;
 };
 
-// text: all up to and with the blank line. False: *refusal is the answer.
+// text: everything up to and including the blank line. False: *refusal is the answer.
 [[nodiscard]] bool parse_http_head(std::string_view text, HttpHead* head, ServerResponse* refusal);
 
-// The length of the body that the head states, at most max_body bytes. False: *refusal is the answer.
+// The length of the body that the head states, at most max_body bytes. False: *refusal is the
+// answer.
 [[nodiscard]] bool body_length(const HttpHead& head, std::size_t max_body, std::size_t* length,
                                ServerResponse* refusal);
 
-// Whether the head of a POST says that more of a body comes than has.
+// Whether the head of a POST announces more body than the `came` bytes that have come.
 [[nodiscard]] bool body_is_to_come(const HttpHead& head, std::size_t came);
 
 }  // namespace alidade

@@ -27,11 +27,13 @@ using Error = boost::system::error_code;
 using Tcp = asio::ip::tcp;
 
 constexpr int kBacklog = 1024;
-// What the kernel keeps for a client that does not read, doubled by it: some seconds of records.
+// The kernel's buffer for a client that does not read, some seconds of records. The kernel doubles
+// it.
 constexpr int kSendBufferBytes = 64 << 10;
-// Where descriptors have run out the client stays in the queue: do not spin until something is closed.
+// Without free descriptors the client stays in the queue. The pause keeps the thread from spinning
+// until something is closed.
 constexpr std::chrono::milliseconds kAcceptAgain{20};
-constexpr double kSilenceS = 10;  // after a failure that was said
+constexpr double kSilenceS = 10;  // after a failure was logged
 
 int make_event() {
   const int descriptor = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
@@ -41,7 +43,8 @@ int make_event() {
 
 void close_on_exec(int descriptor) { static_cast<void>(::fcntl(descriptor, F_SETFD, FD_CLOEXEC)); }
 
-// Counts a wait as long as there is one, whether it ends or is lost: the library drops what it has no memory for.
+// Counts pending waits. A wait stops counting when it ends and when it is lost: the library drops a
+// wait for which it has no memory.
 class Waiting {
  public:
   explicit Waiting(int* count) : count_(count) { ++*count_; }
@@ -57,7 +60,7 @@ class Waiting {
   int* count_;
 };
 
-// Even this may fail then.
+// Logging may fail, too, when memory has run out.
 void say_failure(const char* what) noexcept {
   try {
     spdlog::error("HTTP: connection dropped: {}", what);
@@ -68,7 +71,7 @@ void say_failure(const char* what) noexcept {
 
 }  // namespace
 
-// In the order in which one needs the other.
+// Members in the order of construction: each needs those before it.
 struct HttpListener::Network {
   asio::io_context context{1};
   Tcp::acceptor acceptor{context};
@@ -138,7 +141,7 @@ bool HttpListener::open(std::string* address, std::string* error) {
   return true;
 }
 
-// What is thrown where memory has run out ends one connection and nothing else.
+// An exception, as when memory has run out, ends one connection and nothing else.
 void HttpListener::serve_network() {
   double silent_until_s = 0;
   while (!network_->context.stopped()) {
@@ -156,7 +159,7 @@ void HttpListener::serve_some() {
   try {
     if (watching_ == 0) {
       wait_for_wake();
-      static_cast<void>(::eventfd_write(wake_, 1));  // what was to be done when it was lost
+      static_cast<void>(::eventfd_write(wake_, 1));  // do what was due when the wait was lost
     }
     if (accepting_ == 0) accept();
   } catch (...) {
@@ -188,14 +191,14 @@ void HttpListener::take(Tcp::socket socket) {
   close_on_exec(socket.native_handle());
   Error error;
   const Tcp::endpoint peer = socket.remote_endpoint(error);
-  if (error) return;  // gone again
+  if (error) return;  // the client has gone already
   socket.set_option(asio::socket_base::send_buffer_size(kSendBufferBytes), error);
   socket.set_option(Tcp::no_delay(true), error);
   const HttpAddress address = http_address(peer.address());
   const double now_s = monotonic_now_s();
   std::shared_ptr<HttpTls::Context> tls;
   if (tls_) {
-    // It costs more than most requests.
+    // A handshake costs more than most requests, so it is limited, too.
     if (!gate_.may_shake_hands(address, now_s)) return;
     tls = tls_->context(now_s);
   }
@@ -212,7 +215,7 @@ void HttpListener::wait_for_wake() {
                               wait_for_wake();
                               handlers_.collect();
                               if (!news_.exchange(false)) return;
-                              // One may end while it is woken.
+                              // Keep them alive: a stream may end while it is woken.
                               std::vector<std::shared_ptr<HttpConnection>> woken;
                               places_.streams.for_each([&](HttpConnection* stream) {
                                 woken.push_back(stream->shared_from_this());
@@ -232,7 +235,7 @@ void HttpListener::stop() {
   handlers_.stop();
 }
 
-// The context drops what waits in it, and so the connections.
+// The context drops its pending operations, and with them the connections.
 void HttpListener::close() {
   handlers_.clear();
   network_.reset();

@@ -1,8 +1,9 @@
 #pragma once
-// HttpListener: accepts clients and lets their connections run; wakes endless answers. Where memory or descriptors have run
-// out, clients are lost; it accepts again as soon as there are some.
+// HttpListener: accepts clients, runs their connections and wakes endless answers. If memory or
+// descriptors run out, clients are lost; it accepts clients again as soon as there are some.
 //
-// One thread runs serve_network(): all sockets, all deadlines. A few run serve_handlers().
+// One thread runs serve_network(): all sockets and all deadlines. HttpHandlers::kThreads threads
+// run serve_handlers().
 
 #include <atomic>
 #include <boost/asio/io_context.hpp>
@@ -20,25 +21,25 @@ namespace alidade {
 
 class HttpListener {
  public:
-  // Borrows all of them.
+  // All of them must outlive this object.
   HttpListener(const HttpServerOptions& options, HttpGate* gate, HttpTally* tally);
   ~HttpListener();
   HttpListener(const HttpListener&) = delete;
   HttpListener& operator=(const HttpListener&) = delete;
 
-  // Binds and listens; *address is what was found. False with one line in *error.
+  // Binds and listens. *address: the address with its actual port. False with one line in *error.
   [[nodiscard]] bool open(std::string* address, std::string* error);
 
-  // Until stop().
+  // Both return after stop().
   void serve_network();
   void serve_handlers();
 
-  // Any thread, at any time: endless answers may have more to say. One system call, no lock.
+  // Any thread, at any time: endless answers may have more to send. One system call, no lock.
   void wake();
 
-  // Ends serving. Any thread, but not beside close().
+  // Ends serving. Any thread, but not at the same time as close().
   void stop();
-  // Drops all clients, once no thread serves any more.
+  // Drops all clients. Only when no thread serves any more.
   void close();
 
  private:
@@ -57,8 +58,8 @@ class HttpListener {
   std::optional<HttpTls> tls_;
   HttpPlaces places_;
   HttpHandlers handlers_;
-  int accepting_ = 0;  // that wait for it; none: the last was lost
-  int watching_ = 0;   // likewise for wake_
+  int accepting_ = 0;  // pending waits for a client; 0: the last one was lost
+  int watching_ = 0;   // pending waits for wake_, likewise
   std::unique_ptr<Network> network_;
 };
 

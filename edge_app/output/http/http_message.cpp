@@ -14,7 +14,7 @@ std::optional<std::string> ServerRequest::parameter(const std::string& name) con
 ServerResponse http_error(int status, const std::string& line) {
   ServerResponse response;
   response.status = status;
-  // Of a JSON object the library's destructor allocates, and ends the program where it cannot.
+  // No JSON object here: its destructor allocates, and ends the program if it cannot.
   using Json = nlohmann::json;
   const std::string text = Json(line).dump(-1, ' ', true, Json::error_handler_t::replace);
   response.body = "{\"error\":" + text + "}\n";

@@ -1,5 +1,5 @@
 #pragma once
-// What a handler is asked and what it answers; nothing here knows a socket.
+// Request and response of a handler. Nothing here knows a socket.
 
 #include <functional>
 #include <memory>
@@ -15,19 +15,19 @@ struct ServerRequest {
   std::string path;  // decoded
   std::string body;
   std::vector<std::pair<std::string, std::string>> parameters;  // of the query, decoded
-  double waited_s =
-      0;  // since the request was complete; more than 0 if the handler was asked before
+  // s since the request was complete; 0 at the first call of the handler.
+  double waited_s = 0;
 
   [[nodiscard]] std::optional<std::string> parameter(const std::string& name) const;
 };
 
-// An endless answer: it ends with its client or with the server.
+// An endless answer. It ends when its client or the server ends.
 class HttpStream {
  public:
   virtual ~HttpStream() = default;
-  // Appends what there is to say. Called on the server's one network thread whenever the client has taken all that was
-  // said before, and must not wait; where it appends nothing, it is asked again after HttpServer::wake(), and after
-  // half a second at the latest.
+  // Appends what there is to send. Called on the network thread whenever the client has taken
+  // everything before; must not wait. If it appends nothing, it is called again after
+  // HttpServer::wake(), at the latest after half a second.
   virtual void next(std::string* piece) = 0;
 };
 
@@ -42,8 +42,8 @@ struct ServerResponse {
 // {"error": line}
 [[nodiscard]] ServerResponse http_error(int status, const std::string& line);
 
-// Handlers run on a few threads, several at a time, and must not wait. Nothing: there is no answer yet; the handler is
-// asked again some milliseconds later.
+// Handlers run on several threads at the same time and must not wait. An empty result: there is no
+// answer yet; the handler is called again some milliseconds later.
 using HttpHandler = std::function<std::optional<ServerResponse>(const ServerRequest&)>;
 
 }  // namespace alidade

@@ -1,5 +1,5 @@
 #pragma once
-// Where an HttpServer listens, who may ask, and what one client may cost.
+// Where an HttpServer listens, who may ask, and the limits for a client.
 
 #include <cstddef>
 #include <optional>
@@ -11,21 +11,23 @@
 namespace alidade {
 
 struct HttpLimits {
-  // At once. The next takes the place of the oldest of the address that has most.
-  int max_strangers = 128;  // that have not shown the token, or where none is set
+  // Connections at the same time. One more takes the place of the oldest connection of the address
+  // that holds most.
+  int max_strangers = 128;  // connections that showed no token; all of them if no token is set
   int max_with_token = 64;
-  int max_streams =
-      32;  // endless answers; beyond: 503, but the address that has most gives one to one with less
+  // Endless answers. Beyond that 503, unless another address holds at least two more than the
+  // client's: then that one loses one.
+  int max_streams = 32;
   std::size_t max_head_bytes = 8192;
-  double head_timeout_s = 5;   // from the connection to the head's last byte
-  double body_timeout_s = 10;  // from there to the body's last byte
-  double write_timeout_s = 10;
-  double requests_per_s =
-      500;  // of all strangers, and of all with the token; shared by their addresses
+  double head_timeout_s = 5;    // from the connection to the last byte of the head
+  double body_timeout_s = 10;   // from there to the last byte of the body
+  double write_timeout_s = 10;  // without a byte taken by the client
+  // For all strangers together, and the same for all with a token; shared by their addresses.
+  double requests_per_s = 500;
 };
 
 enum class HttpRight {
-  kView,    // whatever changes nothing
+  kView,    // everything that changes nothing
   kControl  // everything
 };
 
@@ -34,18 +36,19 @@ struct HttpToken {
   HttpRight right = HttpRight::kControl;
 };
 
-// PEM files, read anew when they have changed.
+// PEM files. They are read again when they change.
 struct HttpTlsOptions {
-  std::string certificate;  // the server's first, then those between it and the authority
+  std::string certificate;  // the server's first, then the intermediate ones
   std::string key;
 };
 
 struct HttpServerOptions {
   std::string host = "127.0.0.1";
-  int port = 0;                   // 0: one that is free
-  std::string token;              // may do everything; without it and tokens none is asked for
-  std::vector<HttpToken> tokens;  // further ones
-  // Where the tokens were read and are read anew when it has changed; empty: they stay. http_tokens.h.
+  int port = 0;                   // 0: any free port
+  std::string token;              // may do everything
+  std::vector<HttpToken> tokens;  // further tokens; if `token` is empty, too, none is needed
+  // The file of the tokens, which is read again when it changes; empty: they stay. See
+  // http_tokens.h.
   std::string token_file;
   bool token_file_holds_several = false;
   FileStamp token_file_stamp;

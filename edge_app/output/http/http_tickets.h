@@ -1,7 +1,7 @@
 #pragma once
-// HttpTickets: what a page of this server shows to open an endless answer, where there is no token. A page of another site can
-// make a browser ask for a stream, but cannot read a ticket. Each is 128 random bits, for one use within some seconds.
-// Any thread.
+// HttpTickets: if no token is set, a page of this server shows a ticket to open an endless answer.
+// A page of another site can make a browser ask for a stream, but cannot read a ticket. Each ticket
+// has 128 random bits and is for one use within kValidS. Any thread.
 
 #include <cstddef>
 #include <deque>
@@ -14,9 +14,9 @@ namespace alidade {
 class HttpTickets {
  public:
   static constexpr double kValidS = 10;
-  static constexpr std::size_t kMost = 1024;  // then the oldest goes
+  static constexpr std::size_t kMost = 1024;  // beyond that the oldest is forgotten
 
-  // Nothing: the system has no random bits.
+  // Empty: the system has no random bits.
   [[nodiscard]] std::optional<std::string> issue(double now_s);
   // Whether it was issued, is still valid and was not used before.
   [[nodiscard]] bool take(const std::string& ticket, double now_s);
@@ -30,7 +30,7 @@ class HttpTickets {
   void forget_the_old(double now_s);
 
   std::mutex mutex_;
-  std::deque<Ticket> tickets_;  // the oldest first
+  std::deque<Ticket> tickets_;  // oldest first
 };
 
 }  // namespace alidade

@@ -29,7 +29,7 @@ using Bio = std::unique_ptr<BIO, Free<&BIO_free>>;
 using Certificate = std::unique_ptr<X509, Free<&X509_free>>;
 using Key = std::unique_ptr<EVP_PKEY, Free<&EVP_PKEY_free>>;
 
-// Else the library would ask at the terminal.
+// Without it the library would ask for a password at the terminal.
 int has_no_password(char* /*buffer*/, int /*size*/, int /*writing*/, void* asked) {
   if (asked != nullptr) *static_cast<bool*>(asked) = true;
   return -1;
@@ -104,7 +104,7 @@ bool fill_context(HttpTls::Context* context, const HttpTlsOptions& options, std:
     return fail(options.key, "cannot be used: " + library_says());
   while (X509* const next =
              PEM_read_bio_X509(certificates.get(), nullptr, &has_no_password, nullptr)) {
-    // The context has it from then on.
+    // On success the context owns it.
     if (SSL_CTX_add0_chain_cert(tls, next) == 1) continue;
     X509_free(next);
     return fail(options.certificate, "cannot be used: " + library_says());
@@ -122,7 +122,7 @@ bool HttpTls::load(std::string* error, std::vector<std::string>* warnings) {
   const Stamps stamps{FileStamp(options_.certificate), FileStamp(options_.key)};
   auto context = std::make_shared<Context>(Context::tls_server);
   const bool good = fill_context(context.get(), options_, error, warnings);
-  ERR_clear_error();  // of others' connections, else
+  ERR_clear_error();  // else the errors would show up in connections
   if (!good) return false;
   context_ = std::move(context);
   loaded_ = seen_ = stamps;
@@ -146,7 +146,7 @@ std::shared_ptr<HttpTls::Context> HttpTls::context(double now_s) {
     for (const std::string& warning : warnings) spdlog::warn("HTTP: {}", warning);
     return context_;
   }
-  // Only what stays so for a second time: the other file may be on its way.
+  // Report a failure only if the same files fail again: the second file may not be replaced yet.
   if (is_new) {
     said_ = false;
     seen_ = {FileStamp(options_.certificate), FileStamp(options_.key)};

@@ -1,8 +1,10 @@
 #pragma once
-// HttpTls: certificate and key of a server, read anew when their files have changed, so that they are renewed without a restart.
-// What cannot be used then leaves those before, and is said once: of two files the first is replaced before the second.
+// HttpTls: certificate and key of a server. They are read again when their files change, so that
+// they can be renewed without a restart. If the new files cannot be used, the old ones stay, and
+// that is logged once. A failure counts only if it lasts, as one file is replaced before the other.
 //
-// TLS 1.2 and later, no renegotiation, no compression, no sessions kept here. Network thread, but for load().
+// TLS 1.2 and later; no renegotiation, no compression, no session cache. For the network thread,
+// except load().
 
 #include <boost/asio/ssl/context.hpp>
 #include <memory>
@@ -21,10 +23,11 @@ class HttpTls {
 
   explicit HttpTls(HttpTlsOptions options) : options_(std::move(options)) {}
 
-  // False: *error is one line. Warnings are lines, too: a certificate that is not valid now, a key that others can read.
+  // False with one line in *error. Warnings: a certificate that is not valid now, a key that other
+  // users can read.
   [[nodiscard]] bool load(std::string* error, std::vector<std::string>* warnings);
 
-  // For the next connection; after load().
+  // The context for the next connection. Only after load().
   [[nodiscard]] std::shared_ptr<Context> context(double now_s);
 
  private:
@@ -36,8 +39,8 @@ class HttpTls {
 
   const HttpTlsOptions options_;
   std::shared_ptr<Context> context_;
-  Stamps loaded_;  // of what context_ was made of
-  Stamps seen_;    // when they were looked at last
+  Stamps loaded_;  // of the files from which context_ was made
+  Stamps seen_;    // of the files that were tried last
   bool said_ = false;
   double looked_s_ = 0;
 };

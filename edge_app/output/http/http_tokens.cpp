@@ -16,7 +16,7 @@ namespace {
 constexpr double kLookAtTokensAgainS = 1;
 constexpr std::size_t kMostTokens = 1000;
 
-// Looks at all of what was given, wherever it first differs.
+// Compares in constant time: goes through all of `given`, wherever it first differs.
 bool is_token(std::string_view given, const std::string& token) {
   std::size_t difference = given.size() ^ token.size();
   for (std::size_t i = 0; i < given.size(); ++i) {

@@ -1,10 +1,13 @@
 #pragma once
-// HttpTokens: the tokens of a server and what each may do, from its configuration or from a file that is read anew when it has
-// changed, so that tokens are replaced without a restart. What cannot be used then leaves those before, and is said once.
+// HttpTokens: the tokens of a server and what each may do. They come from the configuration, or
+// from a file that is read again when it changes, so that tokens can be replaced without a restart.
+// If the new file cannot be used, the old tokens stay, and that is logged once.
 //
-//   of one token   the file's first line; it may do everything
-//   of several     a line each, `view TOKEN` or `control TOKEN`; empty lines and those that begin with # are left out
-// A token is at least kShortest visible ASCII signs. Network thread, but for construction and parse_tokens().
+//   one token       the first line of the file; it may do everything
+//   several         one a line, `view TOKEN` or `control TOKEN`; empty lines and lines that begin
+//                   with # are skipped
+// A token has at least kShortestToken visible ASCII characters. For the network thread, except
+// construction and parse_tokens().
 
 #include <cstddef>
 #include <optional>
@@ -20,7 +23,7 @@ namespace alidade {
 inline constexpr std::size_t kShortestToken = 8;
 [[nodiscard]] bool is_usable_token(std::string_view token);
 
-// False: *error says which line is wrong and why, without telling a token.
+// False: *error says which line is wrong and why, without showing a token.
 [[nodiscard]] bool parse_tokens(const std::string& text, std::vector<HttpToken>* tokens,
                                 std::string* error);
 
@@ -28,10 +31,10 @@ class HttpTokens {
  public:
   explicit HttpTokens(const HttpServerOptions& options);
 
-  // Whether tokens are asked for; for ever.
+  // Whether a token is needed. Never changes.
   [[nodiscard]] bool any() const { return any_; }
-  // What the token in a header `Authorization` may do. Nothing: it has none, or none of these. Takes a time that does not
-  // tell how much of it was right.
+  // The right of the token in a header `Authorization`. Empty: no token, or an unknown one. The
+  // duration does not depend on how much of the token was right.
   [[nodiscard]] std::optional<HttpRight> right_of(std::string_view authorization, double now_s);
 
  private:

@@ -1,5 +1,6 @@
 #pragma once
-// HttpTransport: a client's bytes, over TCP or over TLS on it, as one stream to the library's reading and writing. Network thread.
+// HttpTransport: a client's bytes over TCP or TLS, as a stream for the library's read and write
+// functions. For the network thread.
 
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/ip/tcp.hpp>
@@ -18,7 +19,7 @@ class HttpTransport {
   using Socket = boost::asio::ip::tcp::socket;
   using executor_type = Socket::executor_type;
 
-  // tls: null for none.
+  // tls: null for plain TCP.
   HttpTransport(Socket socket, std::shared_ptr<HttpTls::Context> tls)
       : socket_(std::move(socket)), context_(std::move(tls)) {
     if (context_) tls_.emplace(socket_, *context_);
@@ -30,7 +31,7 @@ class HttpTransport {
   [[nodiscard]] bool has_tls() const { return tls_.has_value(); }
   [[nodiscard]] Socket& socket() { return socket_; }
 
-  // With TLS, before all else.
+  // Only with TLS; must come first.
   template <typename Handler>
   void async_handshake(Handler&& handler) {
     tls_->async_handshake(boost::asio::ssl::stream_base::server,
@@ -57,7 +58,8 @@ class HttpTransport {
       socket_.async_write_some(buffers, std::forward<Handler>(handler));
   }
 
-  // Without waiting; a client that does not take it goes without, and so does one that is not ready for it.
+  // Writes without waiting. If the client cannot take the text now, or the TLS handshake is not
+  // done, the text is lost.
   void write_now(std::string_view text) {
     boost::system::error_code ignored;
     socket_.non_blocking(true, ignored);
@@ -68,7 +70,7 @@ class HttpTransport {
       tls_->write_some(buffer, ignored);
   }
 
-  // With TLS: says that nothing follows, and waits for the client to say the same.
+  // Only with TLS: says that nothing follows, and waits until the client says the same.
   template <typename Handler>
   void async_end(Handler&& handler) {
     tls_->async_shutdown(std::forward<Handler>(handler));
