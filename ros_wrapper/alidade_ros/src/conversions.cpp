@@ -8,7 +8,7 @@
 #include <cmath>
 #include <limits>
 
-#include "record_conversion.h"
+#include "alidade_ros/record_conversion.h"
 
 namespace alidade_ros {
 namespace {

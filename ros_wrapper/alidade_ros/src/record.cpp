@@ -1,6 +1,6 @@
 #include "alidade_ros/record.h"
 
-#include "record_conversion.h"
+#include "alidade_ros/record_conversion.h"
 
 namespace alidade_ros {
 namespace {

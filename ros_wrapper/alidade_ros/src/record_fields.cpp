@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "alidade_ros/conversions.h"
-#include "record_conversion.h"
+#include "alidade_ros/record_conversion.h"
 
 namespace alidade_ros {
 

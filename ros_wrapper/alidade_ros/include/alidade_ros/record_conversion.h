@@ -1,5 +1,5 @@
 #pragma once
-// Shared by record_fields.cpp, which is generated, record.cpp and conversions.cpp; not installed.
+// Shared by record_fields.cpp, which is generated, record.cpp and conversions.cpp.
 
 #include <alidade_msgs/FrameOrientation.h>
 #include <geometry_msgs/Quaternion.h>
