@@ -22,7 +22,8 @@ namespace alidade::internal {
 
 // Local parameters: those of Parameter, then the drift between the two clocks. They are scaled so
 // that every lens is equally easy: log f, log alpha, k (R / f)^2 (R: half the image's diagonal,
-// px), centre offset (px), read-out time l h. Changes of axes are local (direction.h).
+// px), centre offset (px), read-out time l h. Changes of axes and landmarks are local
+// (direction.h).
 inline constexpr int kDrift = kParameterCount;
 inline constexpr int kGlobalCount = kParameterCount + 1;
 // The first kCameraCount parameters act on observations.

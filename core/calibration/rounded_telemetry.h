@@ -20,7 +20,7 @@ void set_telemetry_sigma(double white_sigma, double resolution, double stamp_sig
                          std::vector<AdjustmentTelemetry>* telemetry);
 
 // Removes the bias of rounding. Where an axis moves less than two steps from sample to sample,
-// rounding errors are not noise: readings stay off to one side while the axis turns round. But
+// rounding errors are not noise: readings stay off to one side while the axis reverses. But
 // between two readings one step apart it passed half-way between them. That is added as a sample at
 // the middle of their times, with the uncertainty of the moment (trajectory time = telemetry time -
 // shift_s). All equal readings in a row together keep the weight of one with a sigma of the

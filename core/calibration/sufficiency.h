@@ -3,8 +3,9 @@
 //   check_motion   before the adjustment: no motion, one axis only, constant velocity, telemetry
 //                  that does not describe the video
 //   judge          after it: an axis that did not move or lies where no head has it; a parameter
-//                  that the data leave (nearly) open; a scale that cannot be told from the focal
-//                  length; axes and scales that rest on the prior; the weakest direction in words
+//                  that the data leave (nearly) open; a scale that cannot be separated from the
+//                  focal length; axes and scales that rest on the prior; the weakest direction
+//                  in words
 // The limits are those of use: a calibration serves to point a pixel. Allocates.
 
 #include <string>

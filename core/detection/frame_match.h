@@ -4,9 +4,9 @@
 //   now(u) = gain V(u) / V(w) then(w) + offset,   w = warp(u) + shift + shear r
 //   r = 2 u_v / height - 1: -1 in the first row, 1 in the last
 //   V(u) = 1 + falloff |u - middle|^2 / (half diagonal)^2
-// Shift: error of the orientations; shear: of their rates; up to a pixel or two where there is
-// texture, 0 in flat directions. V: lenses are darker at the corners, and the scene moves through
-// that while the camera turns. Moving things are outliers. No allocation. Weights: DifferenceModel.
+// Shift and shear: errors of orientation and rates that the frames do not share, up to a pixel or
+// two where there is texture; 0 in flat directions. V: lenses are darker at the corners, through
+// which the scene moves while the camera turns. Moving things are outliers. No allocation.
 
 #include <algorithm>
 #include <cstdint>

@@ -13,8 +13,8 @@
 
 namespace alidade::internal {
 
-// 0: its area differs from the others', or could not be measured.
 struct CircleCentres {
+  // 0: its area differs from the others', or could not be measured.
   std::vector<char> is_whole;
   std::vector<Vector2<double>> beside;  // shift that was taken off, px
   double radius_m = 0;                  // 0: not measured, the centres are unchanged

@@ -25,8 +25,8 @@ struct TargetTrackerOptions {
   // Of a target's detection to be in its gate, in (0, 1). Wide, so that a target that turns sharply
   // stays inside; the weights account for how unlikely that is.
   double gate_probability = 0.99999;
-  int birth_hits = 3;          // looks with a detection that confirm a target,
-  int birth_looks = 5;         // of so many first ones; at most 32
+  int birth_hits = 3;          // sightings that confirm a target
+  int birth_looks = 5;         // the first looks, among which they must be
   double lose_after_s = 1;     // time in view without being seen
   double forget_after_s = 60;  // since last seen
   double most_sigma = 30;      // m or rad, of the place along its worst direction
