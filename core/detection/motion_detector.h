@@ -27,7 +27,7 @@ struct MotionOptions {
   double sigma_alignment_px = 0.1;
   // Error by different blur, one sigma: half of the difference of its variances.
   double sigma_blur_px2 = 0.03;
-  double exposure_s = 0.005;   // about the longest
+  double exposure_s = 0.005;   // the longest exposure, about
   double most_blur_px = 8;     // by the camera's motion during the exposure
   double most_zoom = 0.1;      // |log| of the ratio of focal lengths of pictures that are compared
   double most_shift_px = 3;    // largest error of orientations

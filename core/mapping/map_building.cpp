@@ -353,7 +353,7 @@ class Building {
   const MapProgress& progress_;
   std::vector<LinkedPicture> pictures_;
   std::vector<PictureLink> links_;
-  bool searched_ = false;  // a common focal length
+  bool searched_ = false;  // whether a common focal length was searched
   LensCurve lens_;         // start value
   // Indices of pictures and their start orientations. The adjustment counts these.
   std::vector<int> kept_;

@@ -65,8 +65,8 @@ struct PoseOptions {
   double least_spread = 0.03;  // rms of the inliers along their narrow side, over the image's width
   // log10 of the expected number of poses with as many inliers by chance.
   double most_chance_log10 = -6;
-  // Another pose that explains this share of the inliers, among the remaining matches, makes the
-  // pose ambiguous.
+  // Another pose is a rival if it has this share of the number of inliers, among the remaining
+  // matches.
   double rival_share = 0.5;
   std::uint64_t seed = 1;
 };

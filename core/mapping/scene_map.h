@@ -26,7 +26,7 @@ struct SceneKeyframe {
   std::string recording;
   std::int64_t frame = 0;  // of the recording, from 0
   double time_utc_s = 0;
-  std::optional<double> zoom;                // the lens's own unit
+  std::optional<double> zoom;                // reading, in the lens's own unit
   double position = 0;                       // s: log f by the zoom reading
   std::optional<PanTilt<double>> telemetry;  // measured angles
   Eigen::Quaterniond R_base_from_camera = Eigen::Quaterniond::Identity();
@@ -48,8 +48,8 @@ struct LandmarkLife {
   double born_utc_s = 0;
   double last_seen_utc_s = 0;
   std::uint32_t looked_for = 0;  // views in which it should have been found
-  std::uint32_t matched = 0;     // in the last sighting or update
-  std::uint32_t missed = 0;      // consecutive ones, up to the latest look
+  std::uint32_t matched = 0;     // views in which it was found
+  std::uint32_t missed = 0;      // consecutive ones up to the latest look; 0 if it was found then
 };
 
 struct SceneLandmark {
@@ -62,7 +62,7 @@ struct SceneLandmark {
   Matrix2<double> covariance = Matrix2<double>::Zero();         // own part
   Matrix2<double> shared_covariance = Matrix2<double>::Zero();  // common part
   double scale_rad = 0;        // sigma of the blob as an angle; > 0
-  double focal_length_px = 0;  // when it was seen
+  double focal_length_px = 0;  // at which it was seen
   Descriptor descriptor{};
   LandmarkLife life;
   // By increasing keyframe, one each. Landmarks born later have none.
