@@ -19,7 +19,7 @@ struct ZoomSample {
   double reading = 0;
   ZoomSampleVector value = ZoomSampleVector::Zero();
   ZoomSampleMatrix covariance = ZoomSampleMatrix::Zero();
-  ZoomSampleMatrix information = ZoomSampleMatrix::Zero();  // inverse of covariance, if not exact
+  ZoomSampleMatrix information = ZoomSampleMatrix::Zero();  // inverse, without exact rows
   // Information of the priors that went in, and that times their means.
   ZoomSampleVector prior_information = ZoomSampleVector::Zero();
   ZoomSampleVector prior_weighted = ZoomSampleVector::Zero();
