@@ -16,7 +16,7 @@ namespace {
 // A pivot of the scaled matrix is 1 minus the share of a parameter that the others explain.
 constexpr double kMinPivot = 1e-13;
 
-// L^-1 in place of L, a lower triangle; a third of the work of solving for the identity.
+// Replaces a lower triangle L by L^-1, with a third of the work of solving for the identity.
 void invert_lower(Eigen::Ref<Eigen::MatrixXd> L) {
   const auto size = L.rows();
   if (size <= 32) {
@@ -67,7 +67,7 @@ bool Adjustment::reduce(const Linearisation& in, double damping) {
 
 bool Adjustment::solve_directly(const Linearisation& in, double damping, Eigen::VectorXd* x) {
   if (!reduce(in, damping)) return false;
-  // Unit diagonal: units of the parameters play no part.
+  // Scaled to a unit diagonal, so that the parameters' units do not matter.
   const Eigen::VectorXd scale = reduced_.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
   reduced_ = scale.asDiagonal() * reduced_ * scale.asDiagonal();
   const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>, Eigen::Lower> llt(reduced_);
@@ -128,7 +128,7 @@ bool Adjustment::descend(const LossScales& loss, int max_steps, double tolerance
       linearise(candidate, loss, &next);
       ++steps_taken_;
       ++step;
-      // A step below the rounding of the cost is as good as its promise.
+      // Also accepts a cost that differs by rounding only.
       accepted = next.valid && next.cost <= at->cost + 1e-9 * at->cost;
       if (accepted) {
         *state = std::move(candidate);
@@ -164,7 +164,8 @@ bool Adjustment::covariance_directly(const Linearisation& in, GlobalMatrix* cova
   const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>, Eigen::Lower> llt(reduced_);
   if (llt.info() != Eigen::Success) return false;
   if (reduced_.diagonal().cwiseAbs2().minCoeff() < kMinPivot) return false;
-  // H^-1 = S (L^-1)^T L^-1 S; only the band of control points that share a segment and the parameters are asked for.
+  // H^-1 = S (L^-1)^T L^-1 S. Only control points that share a segment and the parameters are
+  // needed.
   invert_lower(reduced_);
   const auto root = [&](Eigen::Index i, Eigen::Index from) {
     return reduced_.col(i).tail(size - from);
@@ -201,15 +202,16 @@ bool Adjustment::covariance_iteratively(const Linearisation& in, GlobalMatrix* c
     if (fixed_[static_cast<std::size_t>(i)]) continue;
     if (!equations.solve(Eigen::VectorXd::Unit(size, first_global + i), kTolerance, &x))
       return false;
-    // The last pivot, were it the last parameter.
+    // The pivot that this parameter would have as the last one.
     if (1 < kMinPivot * equations.parameters()(i, i) * x[first_global + i]) return false;
     global_rows_.row(i) = x.transpose();
   }
   *covariance = global_rows_.rightCols<kGlobalCount>();
   *covariance = (0.5 * (*covariance + covariance->transpose())).eval();
 
-  // H_telemetry = L L^T but for a ridge, as telemetry does not reach all unknowns; over random signs w the mean of (L w)^T H^-1 L w is the
-  // trace (Hutchinson), with a variance of at most 2 / kProbes of it.
+  // H_telemetry + ridge = L L^T; the ridge is needed as telemetry does not reach all unknowns. For
+  // random signs w the mean of (L w)^T H^-1 L w is the trace (Hutchinson), with a variance of at
+  // most 2 / kProbes of it.
   constexpr int kProbes = 8;
   constexpr double kProbeTolerance = 1e-3;
   constexpr double kRidge = 1e-11;

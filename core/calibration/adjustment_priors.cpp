@@ -49,7 +49,7 @@ PriorKnowledge prior_knowledge(int width, int height, const CalibrationOptions& 
   set(Parameter::kPanScale, options.pan_scale.sigma);
   set(Parameter::kTiltScale, options.tilt_scale.sigma);
   if (options.clock_offset) {
-    // The shift between the lines is d plus what the stamps' noise leaves open; never exact.
+    // The shift between the clock lines is d plus the error of the stamps, so it is never exact.
     mean.shift_s = options.clock_offset->value;
     set(Parameter::kClockOffset,
         std::sqrt(std::pow(options.clock_offset->sigma, 2) + clocks.stamps_variance()));

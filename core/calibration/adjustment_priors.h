@@ -1,6 +1,6 @@
 #pragma once
-// What is known of the parameters before the adjustment, in its own scaled parameters (linearisation.h): the
-// options' priors, and the drift between the clocks, which the precision of their periods bounds.
+// Prior knowledge in the adjustment's scaled parameters (linearisation.h): the options' priors, and
+// the drift between the clocks, which the precision of their periods bounds.
 
 #include <array>
 
@@ -15,7 +15,7 @@ struct PriorKnowledge {
   std::array<bool, kGlobalCount> fixed{};  // known exactly
 };
 
-// focal_length (px) is the prior's mean where the options have none.
+// focal_length (px): mean of the focal length if the options have no prior of it.
 [[nodiscard]] PriorKnowledge prior_knowledge(int width, int height,
                                              const CalibrationOptions& options,
                                              const RecordingClocks& clocks, double focal_length);

@@ -1,11 +1,12 @@
 #pragma once
-// BorderedBand: the normal matrix of the adjustment before landmarks are eliminated. A spline's control points meet only those that
-// share one of its segments, and all meet the parameters:
+// BorderedBand: the normal matrix of the adjustment before landmarks are eliminated. Control points
+// of the spline are coupled only if they share a segment. All are coupled with the parameters:
 //
 //   H = [ B   C^T ]   B: 2x2 blocks of control points up to kReach apart;  C, D: kBorder rows
 //       [ C    D  ]
 //
-// Of B the lower triangle is kept. As a dense matrix it would be 3 MB at 40 s of frames, and grow with their square.
+// Only the lower triangle of B is stored. Dense, H would take 3 MB for 40 s of frames, and grow
+// with their square.
 
 #include <Eigen/Core>
 #include <algorithm>
@@ -23,7 +24,8 @@ class BorderedBand {
   }
   [[nodiscard]] Eigen::Index rows() const { return border_.cols(); }
 
-  // Row and column by control point, row - column in 0..kReach. Of a diagonal block the upper triangle is nobody's.
+  // Row and column by control point, row - column in 0..kReach. The upper triangle of a diagonal
+  // block is not used.
   [[nodiscard]] auto points(int row, int column) {
     return band_.block<2, 2>(2 * (row - column), 2 * column);
   }
@@ -49,7 +51,8 @@ class BorderedBand {
     dense->bottomRows<kBorder>() = border_;
   }
 
-  // f(row, column, value) for all of the lower triangle that may differ from zero, column by column.
+  // Calls f(row, column, value) for all of the lower triangle that may differ from zero, column by
+  // column.
   template <class Function>
   void for_each(Function f) const {
     const Eigen::Index points = band_.cols();

@@ -23,7 +23,7 @@ StageStatus report(const CalibrationOptions& options, double done, const char* w
   return {CalibrationStatus::kCancelled, "cancelled"};
 }
 
-// Image clock.
+// On the image clock.
 std::vector<double> times_of_used_frames(const internal::AdjustmentData& data) {
   std::vector<char> is_used(data.frame_time_s.size(), 0);
   for (const auto& o : data.observations) {
@@ -36,7 +36,7 @@ std::vector<double> times_of_used_frames(const internal::AdjustmentData& data) {
   return times;
 }
 
-// Stage by stage; the first that refuses says why.
+// Runs stage by stage; the first that refuses says why.
 StageStatus run(const CalibrationInput& input, const CalibrationOptions& options,
                 CalibrationResult* result) {
   StageStatus status;

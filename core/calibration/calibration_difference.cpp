@@ -47,7 +47,7 @@ double difference_chi_square(const Calibration& a, const Calibration& b, bool wi
     covariance(kCount - 1, kCount - 1) = 1;
     x[kCount - 1] = 0;
   }
-  // In units of the sigmas, as the parameters' own differ by many orders of magnitude.
+  // Scaled by the sigmas, as those of the parameters differ by many orders of magnitude.
   const Compared scale = covariance.diagonal().cwiseSqrt().cwiseMax(1e-300).cwiseInverse();
   const ComparedCovariance correlation = scale.asDiagonal() * covariance * scale.asDiagonal();
   const Compared normalised = scale.cwiseProduct(x);

@@ -10,13 +10,13 @@ namespace alidade::internal {
 
 namespace {
 
-// How what is known of the clocks goes into the calibration.
+// How the knowledge of the clocks enters the calibration.
 struct ClockShares {
-  double image = 0;            // of the drift, that is the image clock's
+  double image = 0;            // share of the drift that is the image clock's
   double image_rate = 0;       // relative error of the image clock's period, as estimated
-  double rate_variance = 0;    // of it, with the drift known
+  double rate_variance = 0;    // variance of image_rate, with the drift known
   double lever_s = 0;          // from the image clock's middle to where the drift has no effect
-  double offset_prior = 0;     // of the clock offset's prior against the stamps
+  double offset_prior = 0;     // weight of the clock offset's prior against the stamps
   double stamps_variance = 0;  // s^2
   bool line_delay_known = false;
 };

@@ -1,22 +1,12 @@
 #pragma once
-// calibration.yaml: one calibration as text that a person can read and correct.
-//   format: 1
-//   image: {width: 1920, height: 1080}
-//   focal_length: {value: 32008, sigma: 24}         so for every parameter, in the model's units
-//   pan_axis: {value: [0, 0, 1], sigma: [0, 0]}     unit vector; sigma in rad, in tangent_basis
-//   centre_offset: {value: [0, 0], sigma: [0, 0]}   optional: px, of the optical centre from the image's middle
-//   zoom: 1234                                      optional
-//   covariance: {names: [...], matrix: [[...]]}     optional; the sigmas must agree with it
-//   zoom_curve: {...}                               optional: calibrations at other readings, zoom_text.h
-//   quality: {...}                                  optional: residuals, counts, priors, condition, advice
-//   landmarks: map.bin                              optional: side file, beside this one
-// aspect may be absent (1), centre_offset too (0, exact; it is no name of the covariance then, either), a
-// sigma may be absent (0, exact, unless the covariance says otherwise).
-// quality and landmarks are accepted and not kept: they belong to the run that wrote them.
-// All else is strict: an unknown, missing or doubled key, text for a number, a number that is not
-// finite or betrays another unit is an error in one line, `file:line: what; what would be right`.
-// Reading back what was written gives the same bits.
-// Pure: no file is touched (edge_app/storage/calibration_file.h does). Allocates; no shared state.
+// calibration.yaml: one calibration as text for people to read and correct, in the model's units.
+// Absent values: aspect is 1, centre_offset 0 and exact, a sigma 0 (exact) unless the covariance
+// gives it. quality and landmarks belong to the run that wrote them: they are accepted and not
+// kept.
+// All else is strict. An unknown, missing or doubled key, text for a number, a number that is not
+// finite or looks like another unit is an error, `file:line: what; what would be right`.
+// Reading back what was written gives the same bits (zoom_curve: see zoom_text.h). Pure: touches no
+// file (edge_app/storage/calibration_file.h does). Allocates; no shared state.
 
 #include <optional>
 #include <string>
@@ -29,21 +19,34 @@
 
 namespace alidade {
 
-// What a file tells people of the run that wrote it.
+// What a file tells its readers about the run that wrote it.
 struct CalibrationNotes {
   std::optional<CalibrationQuality> quality;
   std::vector<std::string> excluded;  // CalibrationExclusions::describe()
-  std::vector<std::pair<std::string, CalibrationPrior>> priors;  // that were used, by parameter
+  std::vector<std::pair<std::string, CalibrationPrior>> priors;  // the ones used, by parameter
   std::string landmarks;                                         // side file's name; empty: none
   ZoomCurve zoom_curve;                                          // empty: none
 };
 
-// Text in, calibration or error out. name stands for the file in errors.
-// curve, if not null: the zoom curve, empty without one.
+// Reads a text such as
+//   format: 1
+//   image: {width: 1920, height: 1080}
+//   focal_length: {value: 32008, sigma: 24}         and likewise every parameter
+//   pan_axis: {value: [0, 0, 1], sigma: [0, 0]}     unit vector; sigma in rad, in tangent_basis
+//   centre_offset: {value: [0, 0], sigma: [0, 0]}   optional: px, optical centre - image's middle
+//   zoom: 1234                                      optional
+//   covariance: {names: [...], matrix: [[...]]}     optional; must agree with the sigmas
+//   zoom_curve: {...}                               optional: other readings, zoom_text.h
+//   quality: {...}                                  optional: residuals, counts, priors, advice
+//   landmarks: map.bin                              optional: file beside this one
+// Without centre_offset the covariance does not name the centre either. False and one line in
+// *error; name stands for the file in it. curve, if not null: the zoom curve, empty if there is
+// none.
 [[nodiscard]] bool parse_calibration(const std::string& text, const std::string& name,
                                      Calibration* calibration, std::string* error,
                                      ZoomCurve* curve = nullptr);
-// What files name: all, but the optical centre only where it is anything but the image's middle exactly.
+// The parameters that a file names: all, except an optical centre that is exactly the image's
+// middle.
 [[nodiscard]] std::vector<Parameter> parameters_of(const Calibration& calibration);
 [[nodiscard]] std::string format_calibration(const Calibration& calibration,
                                              const CalibrationNotes& notes = {});

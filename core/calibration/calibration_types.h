@@ -1,6 +1,7 @@
 #pragma once
-// What calibrate() takes and gives: input, options, and a result that says what it rests on.
-// Angles rad, times s, pixels as in camera.h. Telemetry clock = image clock + clock_offset. Plain values.
+// Input, options and result of calibrate(). Plain values. Angles rad, times s, pixels as in
+// camera.h.
+// Telemetry clock = image clock + clock_offset.
 
 #include <cstdint>
 #include <functional>
@@ -14,9 +15,9 @@
 namespace alidade {
 
 struct CalibrationFrame {
-  std::int64_t frame = 0;                // name of the frame in the observations
+  std::int64_t frame = 0;                // the name that observations use
   double stamp_s = 0;                    // of row 0, jitter included
-  std::optional<std::int64_t> sequence;  // counts lost frames too
+  std::optional<std::int64_t> sequence;  // also counts lost frames
 };
 
 struct CalibrationObservation {
@@ -34,7 +35,7 @@ struct CalibrationTelemetry {
   std::optional<std::int64_t> sequence;
 };
 
-// What is not given is estimated from the data.
+// Values that are not given are estimated from the data.
 struct CalibrationNoise {
   std::optional<double> image_stamp_sigma_s;
   std::optional<double> image_period_s;
@@ -43,8 +44,8 @@ struct CalibrationNoise {
   std::optional<double> telemetry_period_s;
   std::optional<double> telemetry_period_sigma_s;
   std::optional<double> pan_tilt_sigma_rad;
-  // Of an error that all telemetry stamps have in common, on top of the above: no number of samples
-  // averages it out of the clock offset. s
+  // s; of an error that all telemetry stamps share, in addition to the above. Averaging over
+  // samples does not reduce its effect on the clock offset.
   double telemetry_common_sigma_s = 0;
 };
 
@@ -63,18 +64,19 @@ struct CalibrationPrior {
   double sigma = 0;
 };
 
-// How the stamps of a stream err.
+// Error model of a stream's time stamps.
 enum class StampNoise {
   kSymmetric,  // zero mean
-  kOneSided,   // never early: network, software
-  kOwnTimes    // polled: each sample was taken about when its stamp says, no steady clock behind it
+  kOneSided,   // never early: stamped after a network or in software
+  kOwnTimes    // polled: taken at about the stamped time, without a steady clock
 };
 
 struct CalibrationOptions {
   std::optional<CalibrationPrior> focal_length;  // px
   std::optional<CalibrationPrior> aspect = CalibrationPrior{1, 0};
   std::optional<CalibrationPrior> radial_distortion;
-  // Of the optical centre from the image's middle; at one zoom it can hardly be told from the axes.
+  // Offset of the optical centre from the image's middle. At one zoom it can hardly be
+  // distinguished from a turn of the axes.
   Vector2<double> centre_offset_px = Vector2<double>::Zero();
   double centre_sigma_px = 0;                    // each component; 0: known exactly
   std::optional<CalibrationPrior> line_delay;    // s/row
@@ -87,18 +89,18 @@ struct CalibrationOptions {
 
   StampNoise image_stamps = StampNoise::kSymmetric;
   StampNoise telemetry_stamps = StampNoise::kSymmetric;
-  double clock_offset_search_s =
-      1;  // half the range searched first; widened if the best is at its edge
+  // Half the range that is searched first. It is widened while the best offset is at its edge.
+  double clock_offset_search_s = 1;
   double first_knot_spacing_s = 0.5;
   int max_knots = 2000;
 
-  // Called between steps with 0 to 1 and a few words; false stops.
+  // Called between steps with the progress (0 to 1) and a few words. Returning false cancels.
   std::function<bool(double, const char*)> progress;
 
   // False and one line in *error (if not null) when a value is out of its range.
   [[nodiscard]] bool validate(std::string* error = nullptr) const;
 
-  // Of what is known of a parameter before; 0: exactly; none: nothing.
+  // Prior standard deviation of a parameter. 0: known exactly. Nothing: no prior.
   [[nodiscard]] std::optional<double> prior_sigma(Parameter parameter) const;
 };
 
@@ -117,9 +119,9 @@ enum class CalibrationStatus {
 
 [[nodiscard]] const char* to_string(CalibrationStatus status);
 
-// One stream's clock as a line through its stamps.
+// One stream's clock, fitted as a line through its stamps.
 struct StreamTiming {
-  bool steady = false;  // false: the stamps do not fit a steady period and are used as they are
+  bool steady = false;  // false: the stamps fit no steady period and are used as they are
   double period_s = 0;
   double period_sigma_s = 0;
   double offset_sigma_s = 0;  // of the line at its middle
@@ -127,11 +129,11 @@ struct StreamTiming {
   int lost = 0;  // gaps in the sequence
 };
 
-// What was left out, and why: never silently.
+// Counts of what was left out, by reason.
 struct CalibrationExclusions {
   int frames_not_finite = 0;
   int frames_duplicate = 0;
-  int frames_without_telemetry = 0;  // outside the telemetry's span
+  int frames_without_telemetry = 0;  // outside the telemetry's time span
   int observations_not_finite = 0;
   int observations_bad_sigma = 0;
   int observations_outside_image = 0;
@@ -151,7 +153,8 @@ struct CalibrationExclusions {
 struct CalibrationLandmark {
   std::int64_t landmark = 0;
   Vector3<double> d_b;
-  // rad^2, in tangent_basis(d_b): of the landmark's own observations, camera and trajectory given.
+  // rad^2, in tangent_basis(d_b). From the landmark's own observations, with camera and trajectory
+  // taken as known.
   Matrix2<double> covariance = Matrix2<double>::Zero();
   int observations = 0;
 };
@@ -163,27 +166,29 @@ struct FrameResult {
   PanTilt<double> rate;
 };
 
-// Standardised residuals: unit variance if the stated noise is right.
+// Seen minus projected (A^-1 e of linearisation.h). Its standard deviation is the observation's
+// sigma_px if the stated noise is right.
 struct ObservationResidual {
   std::size_t observation = 0;  // index into the input
   Vector2<double> error_px;
   bool outlier = false;
 };
-// With angles of a coarse resolution there is one more for each change of a reading, at the middle of the two times:
-// half-way between them the angle passed then. It has NaN for an axis that did not change.
+// Telemetry with a coarse angle resolution gives one more item for each change of a reading. It
+// lies at the middle of the two samples' times, when the angle passed half-way between the
+// readings. It has NaN for an axis that did not change.
 struct TelemetryResidual {
   std::size_t sample = 0;  // index into the input
   double time_s = 0;       // image clock
   Vector2<double> error_rad;
-  Vector2<double> sigma_rad;  // as used; infinite where the error is a rounding's and no noise
+  Vector2<double> sigma_rad;  // as used; infinite where rounding, not noise, makes the error
   bool outlier = false;
 };
 
 struct CalibrationQuality {
   double pixel_sigma_ratio = 0;      // residual / stated noise, redundancy accounted for
   double telemetry_sigma_ratio = 0;  // likewise
-  // How many observations of a landmark in neighbouring frames are worth one, as their errors repeat each other:
-  // the sigmas account for it. 1: they are independent.
+  // How many observations of a landmark in neighbouring frames count as one independent
+  // observation, as their errors are correlated. 1: independent. The sigmas account for it.
   double repetition = 1;
   double mean_reprojection_error_px = 0;
   int frames = 0;
@@ -191,18 +196,19 @@ struct CalibrationQuality {
   int landmarks = 0;
   int telemetry = 0;
   int steps = 0;
-  double motion_correlation = 0;  // between image motion and telemetry, at the start
-  // Of the parameters' correlation matrix: largest over smallest eigenvalue, and the direction in words.
+  double motion_correlation = 0;  // of image motion and telemetry, at the start
+  // Largest over smallest eigenvalue of the parameters' correlation matrix, and the eigenvector of
+  // the largest one in words.
   double condition = 0;
   std::string weakest_direction;
-  // kWeak: clock offset or read-out are among what is too uncertain; changes of speed would help.
+  // Clock offset or read-out time is among what is too uncertain. Changes of speed would help.
   bool weak_in_time = false;
   std::vector<std::string> advice;  // what motion or knowledge would help; also with kOk
 };
 
 struct CalibrationResult {
   CalibrationStatus status = CalibrationStatus::kBadInput;
-  std::string message;      // plain words: what is wrong and what would help; with kOk a summary
+  std::string message;      // what is wrong and what would help; with kOk a summary
   Calibration calibration;  // meaningful with kOk and, for diagnosis, kWeak
   StreamTiming image_timing;
   StreamTiming telemetry_timing;

@@ -20,7 +20,8 @@ struct Line {
   double residual_sigma = 0;  // robust
 };
 
-// Least squares with Cauchy weights on the residuals' own scale: stalls of the stamping program do not count.
+// Least squares without stamps beyond 5 robust sigmas, so that stalls of the stamping program do
+// not count.
 Line fit_line(const std::vector<double>& n, const std::vector<double>& stamp,
               std::optional<double> period, double period_information_of_stamps) {
   Line line;
@@ -48,7 +49,7 @@ Line fit_line(const std::vector<double>& n, const std::vector<double>& stamp,
       magnitude[i] = std::abs(stamp[i] - line.offset - line.period * (n[i] - line.middle));
     }
     line.residual_sigma = 1.4826 * median(magnitude);
-    // Far outliers only: a weight that bites on Gaussian noise would cost efficiency.
+    // Rejects far outliers only: rejecting Gaussian noise would cost efficiency.
     for (std::size_t i = 0; i < n.size(); ++i) {
       weight[i] = magnitude[i] <= 5 * line.residual_sigma ? 1.0 : 0.0;
     }
@@ -59,7 +60,8 @@ Line fit_line(const std::vector<double>& n, const std::vector<double>& stamp,
   return line;
 }
 
-// Standard deviation of white noise on the stamps by their second differences, which a steady clock does not reach.
+// Sigma of white noise on the stamps, from second differences, to which a steady clock adds
+// nothing.
 double white_noise(const std::vector<double>& stamp) {
   std::vector<double> second_differences;
   for (std::size_t i = 2; i < stamp.size(); ++i) {
@@ -68,13 +70,14 @@ double white_noise(const std::vector<double>& stamp) {
   return 1.4826 * median(second_differences) / std::sqrt(6.0);
 }
 
-// Counts ticks along the stamps, each from the line through those before; gaps become whole periods.
+// Counts ticks along the stamps, predicting each from those before. Gaps become whole periods.
 std::vector<double> count_ticks(const std::vector<double>& stamp, std::optional<double> known) {
   std::vector<double> steps;
   for (std::size_t i = 1; i < stamp.size(); ++i) steps.push_back(stamp[i] - stamp[i - 1]);
   double period = known.value_or(median(steps));
   std::vector<double> n(stamp.size(), 0.0);
-  // Mean of the last stamps' offsets from the count: jitter averages out, slow errors of the period do not.
+  // The phase follows the stamps by a tenth: jitter averages out, a slow error of the period is
+  // tracked.
   for (int pass = 0; pass < 2; ++pass) {
     double phase = stamp.front();
     for (std::size_t i = 1; i < stamp.size(); ++i) {
@@ -108,7 +111,8 @@ ClockLine fit_clock_line(const ClockInput& input) {
     }
   } else {
     for (std::size_t i = 0; i < count; ++i) n[i] = static_cast<double>(i);
-    // A lost tick leaves a step in the residuals of the plain count, more than white noise.
+    // A lost tick is a step in the residuals of the plain count, which white noise does not
+    // explain.
     const bool none_lost = fit_line(n, input.stamp_s, std::nullopt, 0).residual_sigma <
                            1.2 * white_noise(input.stamp_s) + 1e-9;
     if (none_lost) {
@@ -129,7 +133,7 @@ ClockLine fit_clock_line(const ClockInput& input) {
   }
   sigma = std::max(sigma, 1e-9);
   result.stamp_sigma_s = sigma;
-  // Jitter of a third of a period or more cannot be told from an unsteady clock unless ticks are counted.
+  // Jitter above a quarter of a period looks like an unsteady clock unless ticks are counted.
   if (!counted && line.residual_sigma > line.period / 4) return result;
   result.steady = true;
 
@@ -146,7 +150,7 @@ ClockLine fit_clock_line(const ClockInput& input) {
                                   ? 4 * *input.period_sigma_s + 6 * sigma / std::sqrt(line.spread)
                                   : 20 * sigma / std::sqrt(line.spread);
     std::vector<std::uint16_t> hull(count);
-    // The mean height above the least delay is the scale of an exponential one.
+    // Exponential delays have their mean above the least delay as scale.
     const LineEstimate lower =
         fit_lower_line(n.data(), input.stamp_s.data(), std::min<std::size_t>(count, 65535),
                        std::max(-lowest, 1e-9), line.period - half_range, line.period + half_range,

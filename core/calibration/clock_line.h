@@ -1,13 +1,12 @@
 #pragma once
-// From the stamps of a stream to the times at which a steady clock ticked, with what is not known about
-// it: for a whole recording the clock is one straight line,
+// fit_clock_line(): the times of a steady clock from the jittery stamps of a whole recording,
 //   stamp_i = offset + period (n_i - n_mean) + noise_i                           (PTCEE 20, 21)
-// kSymmetric: weighted least squares with a redescending weight, joined with the measured period if
-// there is one; offset and period are then uncorrelated. kOneSided: the highest line below the
-// stamps (core/model/lower_line.h); its constant least delay becomes part of the clock offset.
-// n_i are sequence numbers or, without them, counted along the stamps, gaps included. Stamps that do
-// not fit a steady clock are kept as they are, and that is said; so are those that have none behind them (a
-// polled device). Allocates.
+// Symmetric noise: least squares without outliers beyond 5 robust sigmas, joined with the known
+// period if there is one. Offset and period are then uncorrelated. one_sided: the highest line
+// below the stamps (core/model/lower_line.h); its constant least delay becomes part of the clock
+// offset.
+// n_i are sequence numbers or, without them, counted along the stamps with gaps. Stamps that fit no
+// steady clock, or have none (a polled device), stay as they are. Allocates.
 
 #include <cstdint>
 #include <optional>

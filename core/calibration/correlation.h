@@ -1,5 +1,5 @@
 #pragma once
-// A covariance in units of its sigmas.
+// A covariance as a correlation matrix.
 
 #include <cmath>
 
@@ -7,7 +7,7 @@
 
 namespace alidade {
 
-// What has no variance stands apart, with a correlation of 1 with itself.
+// A row without variance gets the correlation 1 with itself and 0 with all others.
 template <int N>
 [[nodiscard]] Matrix<double, N, N> correlation_of(const Matrix<double, N, N>& covariance) {
   Matrix<double, N, N> correlation = Matrix<double, N, N>::Identity();

@@ -153,7 +153,7 @@ void EstimateReader::read_covariance(const YAML::Node& entry, const EstimateRows
   check_positive(matrix, rows, covariance);
 }
 
-// Judged on the correlations: the variances of f and of the line delay are 17 orders apart.
+// Checks the correlations: the variances of f and of the line delay are 17 orders apart.
 void EstimateReader::check_positive(const YAML::Node& matrix, const EstimateRows& rows,
                                     const Eigen::MatrixXd& covariance) const {
   Eigen::MatrixXd correlation = covariance;

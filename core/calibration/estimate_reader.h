@@ -1,10 +1,11 @@
 #pragma once
-// EstimateReader: what files of estimates (calibration.yaml, lens.yaml) have in common, read strictly (strict_yaml.h):
+// EstimateReader: what files of estimates (calibration.yaml, lens.yaml) have in common, read
+// strictly (strict_yaml.h):
 //   format: 1
 //   image: {width: 1920, height: 1080}
 //   NAME: {value: ..., sigma: ...}
 //   covariance: {names: [...], matrix: [[...]]}
-// All complaints are YamlError with one line, `file:line: what; what would be right`. Allocates.
+// Errors are thrown as YamlError with one line, `file:line: what; what would be right`. Allocates.
 
 #include <Eigen/Core>
 #include <string>
@@ -14,14 +15,15 @@
 
 namespace alidade {
 
-// Of a plausible value in the right unit: one outside is more likely in another unit.
+// Plausible values in the right unit. A value outside is probably in another unit.
 struct EstimateRange {
   double least;
   double most;
   const char* hint;  // completes "give ..."
 };
 
-// What a covariance is of: rows by name, the largest sigma of each, and what to say of an unknown name and of the unit.
+// The rows of a covariance: names, the largest sigma of each, and the texts for an unknown name and
+// for the unit.
 struct EstimateRows {
   std::vector<std::string> names;
   std::vector<double> largest_sigma;
@@ -36,11 +38,11 @@ class EstimateReader {
   [[noreturn]] void fail(const YAML::Node& node, const std::string& text) const;
   [[nodiscard]] const YAML::Node& root() const { return root_; }
 
-  // kind completes "not ..."; known: the keys at the top.
+  // kind completes "not ...". known: the keys allowed at the top.
   void check_top(const std::string& kind, const std::vector<std::string>& known) const;
   void check_keys(const YAML::Node& map, const std::vector<std::string>& known,
                   const std::string& prefix) const;
-  // prefix: of the key's path, with a dot at its end.
+  // prefix: the path of the map, with a dot at its end.
   [[nodiscard]] YAML::Node required(const YAML::Node& map, const char* key,
                                     const std::string& prefix) const;
   [[nodiscard]] double number(const YAML::Node& node, const std::string& name) const;
@@ -50,14 +52,15 @@ class EstimateReader {
   void read_image(int* width, int* height) const;
   // The map {value, sigma} of this name.
   [[nodiscard]] YAML::Node entry(const std::string& name) const;
-  // Its value, in its range.
+  // Its value, checked against the range.
   [[nodiscard]] double value(const YAML::Node& entry, const std::string& name,
                              const EstimateRange& range) const;
 
-  // Over the rows that the file names; others stay. Symmetric, positive semidefinite, no sigma beyond its largest.
+  // Fills the rows that the file names; the others keep their values. Requires a symmetric,
+  // positive semidefinite matrix and no sigma beyond its largest.
   void read_covariance(const YAML::Node& entry, const EstimateRows& rows,
                        Eigen::Ref<Eigen::MatrixXd> covariance) const;
-  // sigma against the covariance of the same file.
+  // Checks sigma against the covariance of the same file.
   void check_sigma(const YAML::Node& node, const std::string& name, double sigma,
                    double variance) const;
 

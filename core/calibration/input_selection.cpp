@@ -121,7 +121,7 @@ StageStatus select_observations(const CalibrationInput& input, SelectedInput* se
                    [](const Candidate& a, const Candidate& b) {
                      return a.landmark != b.landmark ? a.landmark < b.landmark : a.frame < b.frame;
                    });
-  // The same landmark twice in a frame: nobody knows which one is right.
+  // A landmark seen twice in a frame: it is unknown which one is right, so both are left out.
   std::vector<Candidate> unique;
   for (std::size_t i = 0; i < candidates.size();) {
     std::size_t end = i + 1;

@@ -1,10 +1,11 @@
 #pragma once
-// First stage of calibrate(): what of the input can be used, in what order, and what is left out and why.
-//   frames        with a finite stamp, each name once; by sequence number if all have one, else by stamp
-//   telemetry     finite, each number (or stamp) once; likewise ordered
-//   observations  finite, with a sigma, inside the image (1 px of margin), in a frame used, of a landmark seen once in the
-//                 frame and in two frames or more; by landmark, then by frame
-// Refused is what has too little of any, or betrays another unit: degrees, normalised coordinates. Allocates.
+// select_input(): first stage of calibrate(). Selects and orders the usable input.
+//   frames         finite stamp, each name once; ordered by sequence number if all have one, else
+//                  by stamp
+//   telemetry      finite, each number (or stamp) once; ordered likewise
+//   observations   finite, sigma > 0, in the image (1 px of margin), in a used frame, of a landmark
+//                  seen once there and in two frames or more; ordered by landmark, then frame
+// Refuses too little of any, and other units: degrees, normalised coordinates. Allocates.
 
 #include <cstddef>
 #include <cstdint>
@@ -15,10 +16,10 @@
 
 namespace alidade::internal {
 
-// Landmarks that the adjustment needs at least.
+// The least number of landmarks for the adjustment.
 inline constexpr std::size_t kMinLandmarks = 8;
 
-// What the adjustment is given, and which item of the input each part of it was.
+// The adjustment's data, and the index into the input of each item.
 struct SelectedInput {
   AdjustmentData data;
   std::vector<std::size_t> frame_index;        // for data.frame_time_s
@@ -27,8 +28,8 @@ struct SelectedInput {
   std::vector<std::int64_t> landmark_name;     // for each landmark of data.observations
 };
 
-// Fills the indices, the names and data.observations: times are those of clocks (recording_clocks.h). What is left out
-// is counted in *excluded.
+// Fills the indices, the names and data.observations. fit_clocks() sets the times
+// (recording_clocks.h). What is left out is counted in *excluded.
 [[nodiscard]] StageStatus select_input(const CalibrationInput& input, SelectedInput* selected,
                                        CalibrationExclusions* excluded);
 

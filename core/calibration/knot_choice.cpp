@@ -49,7 +49,7 @@ std::vector<Pointing> pointings(const AdjustmentData& data, const Linearisation&
   return all;
 }
 
-// The gain of each pointing from the best change of the spline's control points.
+// Reduction of each pointing's cost by the best change of the spline's control points.
 std::vector<double> gains(const std::vector<Pointing>& pointings, const TrajectorySpline& spline) {
   const int size = 2 * spline.control_points();
   std::vector<Eigen::Triplet<double>> entries;
@@ -73,7 +73,7 @@ std::vector<double> gains(const std::vector<Pointing>& pointings, const Trajecto
       }
     }
   }
-  // Control points that no data reach stay where they are.
+  // Control points without data stay where they are.
   for (int i = 0; i < size; ++i) entries.emplace_back(i, i, 1e-9 * largest);
   Eigen::SparseMatrix<double> H(size, size);
   H.setFromTriplets(entries.begin(), entries.end());
@@ -94,7 +94,8 @@ std::vector<double> gains(const std::vector<Pointing>& pointings, const Trajecto
   return result;
 }
 
-// Of each segment: whether it and its neighbours together gain so much more than noise gives: where there are 16, twice that.
+// For each segment: whether it and its neighbours gain more than noise does by 4 standard
+// deviations. With 16 of them that is twice the expectation.
 std::vector<bool> halving_pays(const std::vector<double>& gain) {
   constexpr std::size_t kNeighbours = 16;
   constexpr double kSigmas = 4;

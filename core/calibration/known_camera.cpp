@@ -10,7 +10,7 @@ namespace alidade {
 namespace {
 
 constexpr double kMostSigmas = 5;
-// Of the focal length: another zoom, and no flaw of either calibration.
+// Relative difference of focal lengths that means another zoom, not a flaw of either calibration.
 constexpr double kAnotherZoom = 0.03;
 
 struct Difference {

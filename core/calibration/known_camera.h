@@ -1,11 +1,12 @@
 #pragma once
-// calibrate() with a camera that is known from elsewhere, such as from a bench (core/pattern). Line delay and aspect are the sensor's and
-// hold at any zoom; focal length and distortion hold at the one at which they were found. Which zoom a recording has is seen
-// by its own focal length. So first the recording alone is calibrated, then each value that is wanted is held against it:
-//   |x - x_alone| <= 5 sqrt(sigma^2 + sigma_alone^2)
-// and what agrees becomes a prior of a second adjustment. The distortion goes with the focal length. What does not agree is
-// left out and said. Without a solution of the recording alone, line delay and aspect are taken on trust, and that is said.
-// Pure, as calibrate(); takes twice its time.
+// calibrate_knowing(): calibrate() with values known from elsewhere, such as a bench
+// (core/pattern).
+// Line delay and aspect belong to the sensor and hold at any zoom. Focal length and distortion hold
+// at one zoom; the recording's own focal length shows whether it is that. So the recording alone is
+// calibrated first. A wanted value x that agrees, |x - x_alone| <= 5 sqrt(sigma^2 + sigma_alone^2),
+// becomes a prior of a second adjustment; distortion only if the focal length agrees. Remarks name
+// what is left out. If the recording alone has no solution, line delay and aspect are used
+// unchecked, with a remark. Pure, as calibrate(); takes twice its time.
 
 #include <string>
 #include <vector>
@@ -16,12 +17,12 @@ namespace alidade {
 
 struct KnownValue {
   CalibrationPrior prior;
-  bool wanted = false;  // false: it is stated otherwise, or not known
+  bool wanted = false;  // false: not known, or stated otherwise
 };
 
-// Of images of the recording's size; units as in CalibrationOptions.
+// For images of the recording's size. Units as in CalibrationOptions.
 struct KnownCamera {
-  std::string name;  // where it is from, for remarks
+  std::string name;  // origin, named in remarks
   KnownValue focal_length;
   KnownValue aspect;
   KnownValue radial_distortion;
@@ -36,10 +37,10 @@ struct KnownCamera {
 struct KnownCameraCalibration {
   CalibrationResult result;
   CalibrationOptions options;        // as used
-  std::vector<std::string> remarks;  // on what was not taken, and why
+  std::vector<std::string> remarks;  // what was not used, and why
 };
 
-// options: priors that are stated otherwise; those of wanted values are replaced.
+// options: priors stated otherwise. Known values that are accepted replace them.
 [[nodiscard]] KnownCameraCalibration calibrate_knowing(const CalibrationInput& input,
                                                        const CalibrationOptions& options,
                                                        const KnownCamera& known);

@@ -1,6 +1,7 @@
 #pragma once
-// What is left of the normal equations H x = g when each landmark's direction is the best for whatever x is: S = H - Y Y^T, g - Y y with
-// Y = H_touched L^-T, y = L^-1 g_landmark, L L^T = H_landmark, two columns of Y a landmark.
+// Eliminates the landmarks from the normal equations H x = g: each direction is the best one for x.
+// What remains is S = H - Y Y^T and g - Y y, with Y = H_touched L^-T, y = L^-1 g_landmark, L L^T =
+// H_landmark. Y has two columns for each landmark.
 
 #include <Eigen/Cholesky>
 #include <cstddef>
@@ -12,7 +13,7 @@ namespace alidade::internal {
 
 using CameraRows = Eigen::Matrix<double, kCameraCount, 2>;
 
-// A landmark's columns of Y and what they make of its gradient: rows of control points as in Linearisation::touched.
+// A landmark's columns of Y, and its y (gradient). Control points as in Linearisation::touched.
 struct EliminatedLandmark {
   std::size_t landmark = 0;
   std::vector<Matrix2<double>> points;
@@ -20,8 +21,8 @@ struct EliminatedLandmark {
   Vector2<double> gradient;
 };
 
-// Calls use(EliminatedLandmark) of each landmark that is observed, every diagonal element of H multiplied by 1 + damping.
-// False if the block of one is not positive definite.
+// Calls use(EliminatedLandmark) for each observed landmark, with the diagonal of H multiplied by 1
+// + damping. False if the block of one is not positive definite.
 template <class Use>
 [[nodiscard]] bool eliminate_landmarks(const Linearisation& in, double damping, Use use) {
   EliminatedLandmark out;

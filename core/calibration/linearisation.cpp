@@ -10,7 +10,8 @@ namespace {
 
 using CameraJacobian = Eigen::Matrix<double, 2, kCameraCount>;
 
-// Row velocity of the image beyond which a landmark meets the read-out in no definite row.
+// Image motion per row read out, in rows. Beyond this a landmark meets the read-out in no definite
+// row.
 constexpr double kMaxRowSlope = 0.9;
 
 struct ObservationModel {
@@ -48,7 +49,7 @@ struct ObservationModel {
     CameraJacobian J_camera;
   };
 
-  // In units of sigma.
+  // Error and derivatives in units of sigma.
   [[nodiscard]] bool evaluate(const AdjustmentObservation& observation,
                               const PanTilt<double>& angle, const PanTilt<double>& rate,
                               const Landmark& landmark, Result* out) const {
@@ -97,10 +98,10 @@ RobustCost robust_cost(double squared_error, double scale) {
   return {c * std::log1p(squared_error / c), 1 / (1 + squared_error / c)};
 }
 
-// What an observation without a projection costs: it must not pay to lose one.
+// Cost of an observation without a projection: it must not pay to lose one.
 constexpr double kLostSquaredError = 1e10;
 
-// H's block of four control points: J^T J (x) w w^T, lower triangle.
+// Adds J^T J (x) w w^T to H's block of four control points, lower triangle.
 void add_control_points(const TrajectorySpline::Basis& basis, const Matrix2<double>& J_squared,
                         NormalMatrix* H) {
   for (int i = 0; i < 4; ++i) {
@@ -260,7 +261,7 @@ std::vector<Influence> Lineariser::influences(const AdjustmentState& state, cons
     const int name = data_.observations[i].landmark;
     const auto l = static_cast<std::size_t>(name);
     const ObservationModel::Landmark landmark = model.turn(state.landmarks[l]);
-    // What the landmark's direction takes over.
+    // The part that the landmark's direction absorbs.
     Influence of_landmark = of_camera * at.H_camera[l];
     for (std::size_t j = at.touched_begin[l]; j < at.touched_begin[l + 1]; ++j) {
       of_landmark += inverse.middleCols<2>(2 * at.touched[j]) * at.H_touched[j];
@@ -345,7 +346,7 @@ void Lineariser::add_priors(const AdjustmentState& state, Linearisation* out) co
   error[index(Parameter::kFocalLength)] =
       std::log(mean.camera.focal_length / state.camera.focal_length);
   error[index(Parameter::kAspect)] = std::log(mean.camera.aspect / state.camera.aspect);
-  // Of k itself, not of its scaled form.
+  // The prior is of k itself, not of its scaled form.
   const double f_ratio = state.camera.focal_length / mean.camera.focal_length;
   error[index(Parameter::kRadialDistortion)] =
       mean.distortion - state.distortion * f_ratio * f_ratio;

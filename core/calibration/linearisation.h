@@ -1,15 +1,12 @@
 #pragma once
-// The sum of squares that a calibration minimises, linearised: over the parameters, the trajectory and the landmarks
+// The sum of squares that a calibration minimises, linearised: over the parameters, the trajectory
+// and the landmarks
 //   sum rho(|A^-1 (u - pi(R(p(t + v l))^T d_b))|^2 / sigma_px^2)         one observation (u, v)
 // + sum rho(|wrap(measured - scale p(t'))|^2 / sigma_rad^2)              one telemetry sample
 // + priors,        t' = t_telemetry - shift + drift (t_telemetry - reference).
-// A is the row-time effect of (Oth 18 to 21): A^-1 e is the Newton step from the observed row
-// (PTCEE 42) to the row at which the landmark is seen, so the residual is u minus the full
-// rolling-shutter projection, with white noise of sigma_px. Derivatives hold A fixed, at the observed row: the
-// noise of v then shifts the line delay by some hundredths of its sigma (bounded in ceres_adjustment_test).
-// Parameters are scaled so that every lens is equally easy: log f, log alpha, k (R / f)^2 (R: half the
-// image's diagonal, px), the optical centre's offset (px), read-out time l h; changes are local (direction.h for axes and landmarks).
-// Angles in rad, times in s on the image clock. Allocates.
+// A is the row-time effect of (Oth 18 to 21); A^-1 e is the residual of the full rolling-shutter
+// projection.
+// Angles in rad, times in s on the image clock. Allocates. Derivation: docs/derivations.md.
 
 #include <Eigen/Core>
 #include <array>
@@ -23,10 +20,13 @@
 
 namespace alidade::internal {
 
-// Local parameters: those of Parameter, scaled as above, and the drift between the two clocks.
+// Local parameters: those of Parameter, then the drift between the two clocks. They are scaled so
+// that every lens is equally easy: log f, log alpha, k (R / f)^2 (R: half the image's diagonal,
+// px), centre offset (px), read-out time l h. Changes of axes and landmarks are local
+// (direction.h).
 inline constexpr int kDrift = kParameterCount;
 inline constexpr int kGlobalCount = kParameterCount + 1;
-// The first ones act on observations.
+// The first kCameraCount parameters act on observations.
 inline constexpr int kCameraCount = 10;
 
 using GlobalVector = Eigen::Matrix<double, kGlobalCount, 1>;
@@ -43,8 +43,8 @@ struct AdjustmentObservation {
 struct AdjustmentTelemetry {
   double time_s = 0;  // on the telemetry clock
   Vector2<double> measured;
-  Vector2<double> sigma = Vector2<double>::Ones();  // rad; infinite: nothing is said of this axis
-  // Whether the residual of each axis tells how large the noise is: a rounding error does not.
+  Vector2<double> sigma = Vector2<double>::Ones();  // rad; infinite: this axis is not measured
+  // Whether an axis's residual shows the size of the noise. That of a rounding error does not.
   std::array<bool, 2> is_noise = {true, true};
   bool used = true;
 };
@@ -53,19 +53,19 @@ struct AdjustmentData {
   std::vector<double> frame_time_s;
   std::vector<AdjustmentObservation> observations;  // sorted by landmark, then frame
   std::vector<AdjustmentTelemetry> telemetry;       // sorted by time
-  double reference_s = 0;                           // where the drift has no effect
+  double reference_s = 0;                           // time at which the drift has no effect
 };
 
 struct AdjustmentState {
-  Camera<double> camera;  // radial_distortion is unused here, see below
+  Camera<double> camera;  // radial_distortion is unused, see distortion
   double distortion = 0;  // k (R / f)^2
   double readout_s = 0;   // line delay times height
   Mechanics<double> mechanics;
   double shift_s = 0;
   double drift = 0;
   TrajectorySpline trajectory;
-  // In the frame of the camera when the mount stands at the anchor: an axis that turns takes them along,
-  // else far from zero pan every change of an axis would be a large change of all landmarks.
+  // In the camera frame at the anchor's pan and tilt, so that landmarks turn with the axes.
+  // Otherwise, far from zero pan, every change of an axis would be a large change of all landmarks.
   PanTilt<double> anchor;
   std::vector<Vector3<double>> landmarks;
 
@@ -73,8 +73,8 @@ struct AdjustmentState {
   [[nodiscard]] double line_delay() const { return readout_s / camera.height; }
 };
 
-// A Gaussian prior on each local parameter: information 0 = none. For the axes, in the tangent basis of
-// the prior's own axes.
+// A Gaussian prior on each local parameter; information 0: none. Axes: in the tangent basis of the
+// prior's axes.
 struct AdjustmentPriors {
   AdjustmentState mean;  // its trajectory and landmarks are unused
   GlobalVector information = GlobalVector::Zero();
@@ -86,8 +86,8 @@ struct LossScales {
   double telemetry = std::numeric_limits<double>::infinity();
 };
 
-// What the current state makes of one observation or sample: e and its derivative by (pan, tilt), both
-// in units of sigma and times the square root of the robust weight.
+// Residual e of one observation or sample at the current state, and its derivative by (pan, tilt).
+// Both in units of sigma, times the square root of the robust weight.
 struct LinearisedResidual {
   double time_s = 0;
   int segment = 0;
@@ -117,9 +117,9 @@ struct Linearisation {
   std::vector<Eigen::Matrix<double, kCameraCount, 2>> H_camera;
 };
 
-// Rows of H^-1, landmarks eliminated, that belong to the parameters: as many columns as H.
+// The parameters' rows of H^-1, with landmarks eliminated; as many columns as H.
 using GlobalRows = Eigen::Matrix<double, kGlobalCount, Eigen::Dynamic>;
-// By how much the parameters move with the error of one observation, in units of its sigma.
+// Change of the parameters with the error of one observation, in units of its sigma.
 using Influence = Eigen::Matrix<double, kGlobalCount, 2>;
 
 void apply_step(const Eigen::VectorXd& x, const std::vector<Vector2<double>>& x_landmark,
@@ -132,10 +132,11 @@ class Lineariser {
              const std::array<bool, kGlobalCount>& fixed)
       : data_(data), priors_(priors), fixed_(fixed) {}
 
-  // All that *out holds is replaced; its memory is used again.
+  // Replaces all that *out holds, and reuses its memory.
   void linearise(const AdjustmentState& state, const LossScales& loss, Linearisation* out);
 
-  // Of each observation, zero if it is not used. `at`: of least squares, at this state; inverse: of its H.
+  // Of each observation; zero if it is not used. at: least squares at this state. inverse: rows of
+  // its H^-1.
   [[nodiscard]] std::vector<Influence> influences(const AdjustmentState& state,
                                                   const Linearisation& at,
                                                   const GlobalRows& inverse) const;

@@ -23,7 +23,7 @@ std::vector<ImageMotion> image_motion(const AdjustmentData& data, double baselin
   std::vector<int> chain(frames, 0);
   std::vector<double> du;
   std::vector<double> dv;
-  // A frame in which nothing was looked for says nothing of the motion, not even that it broke off.
+  // A frame without observations does not break the chain: nothing was tracked in it.
   std::size_t before = 0;
   for (std::size_t i = 1; i < frames; ++i) {
     if (seen[i].empty()) continue;
@@ -56,7 +56,7 @@ std::vector<ImageMotion> image_motion(const AdjustmentData& data, double baselin
 
 MotionMatch match_motion(const std::vector<ImageMotion>& motion, const TrajectorySpline& telemetry,
                          double centre_s, double half_range_s, const Vector2<double>& signs) {
-  // The telemetry on a grid: every candidate needs it at all frames.
+  // Telemetry sampled on a grid, as every candidate needs it at all frames.
   constexpr double kGridStep_s = 2e-3;
   const int grid_size =
       static_cast<int>((telemetry.end_s() - telemetry.begin_s()) / kGridStep_s) + 1;
@@ -133,7 +133,7 @@ MotionMatch match_motion(const std::vector<ImageMotion>& motion, const Trajector
 
 namespace {
 
-// Of pan and of tilt alone, with the signs that they have.
+// Correlation of pan alone and of tilt alone, with the telemetry's own signs.
 Vector2<double> axis_correlation(const std::vector<ImageMotion>& motion,
                                  const TrajectorySpline& telemetry, const MotionMatch& match) {
   Vector2<double> mp = Vector2<double>::Zero();
@@ -150,7 +150,7 @@ Vector2<double> axis_correlation(const std::vector<ImageMotion>& motion,
     mm += shift.cwiseAbs2();
     pp += turned.cwiseAbs2();
   }
-  // What does not move has none.
+  // An axis that does not move gets 0.
   return mp.cwiseQuotient(mm.cwiseProduct(pp).cwiseSqrt().cwiseMax(1e-300));
 }
 
@@ -160,7 +160,7 @@ ReversedAxes reversed_axes(const std::vector<ImageMotion>& motion,
                            const TrajectorySpline& telemetry, const MotionMatch& match) {
   constexpr double kMinCorrelation = 0.9;
   constexpr double kMinAxisCorrelation = 0.8;
-  constexpr double kMuchLess = 1.0 / 3;  // of what the signs as they are leave unexplained
+  constexpr double kMuchLess = 1.0 / 3;  // of what is unexplained with the signs as they are
   const auto unexplained = [](const MotionMatch& m) { return 1 - m.correlation * m.correlation; };
   double least = kMuchLess * unexplained(match);
   ReversedAxes reversed;
@@ -169,7 +169,7 @@ ReversedAxes reversed_axes(const std::vector<ImageMotion>& motion,
     const MotionMatch other =
         match_motion(motion, telemetry, match.centre_s, match.half_range_s, signs);
     if (other.correlation < kMinCorrelation || unexplained(other) > least) continue;
-    // An axis that hardly moves shows no sign: what the other one does to the image tells nothing of it.
+    // An axis that hardly moves does not show its sign, however well the other axis correlates.
     const Vector2<double> each = signs.cwiseProduct(axis_correlation(motion, telemetry, other));
     if (signs.x() < 0 && each.x() < kMinAxisCorrelation) continue;
     if (signs.y() < 0 && each.y() < kMinAxisCorrelation) continue;

@@ -1,9 +1,12 @@
 #pragma once
-// Clock offset and focal length from motion alone, without a guess: over some 0.5 s the image moves by
+// Clock offset and focal length from motion alone, without a guess. Over some 0.5 s the image moves
+// by
 //   (-f cos(tilt) dpan, f dtilt).
-// d is where the median motion of the tracks correlates best with the telemetry's, f is the ratio there. Medians and
-// the normalised correlation need neither a guess of f nor clean tracks. Small tilt and nominal axes are
-// assumed: good to some percent, which the robust adjustment removes. Allocates.
+// d is the shift at which the tracks' median motion correlates best with the telemetry's. f is the
+// ratio of the two motions there. Medians and the normalised correlation need neither a guess of f
+// nor clean tracks.
+// Small tilt and nominal axes are assumed: good to some percent, which the robust adjustment
+// removes. Allocates.
 
 #include <vector>
 
@@ -18,7 +21,7 @@ struct ImageMotion {
   Vector2<double> shift;  // px
 };
 
-// Over baselines of about baseline_s, along chains of frames that share landmarks.
+// Motions over about baseline_s, along chains of frames that share landmarks.
 [[nodiscard]] std::vector<ImageMotion> image_motion(const AdjustmentData& data, double baseline_s);
 
 struct MotionMatch {
@@ -26,24 +29,26 @@ struct MotionMatch {
   double focal_length = 0;
   double correlation = 0;  // of the motions, 1 = perfect
   bool at_edge = false;    // of the range that was searched
-  bool apart = false;      // no shift gives half of the video's motion telemetry beside it
-  double centre_s = 0;     // where it was searched
+  bool apart = false;      // no shift covers half of the video's motion with telemetry
+  double centre_s = 0;     // centre of the search
   double half_range_s = 0;
 };
 
-// The best shift within half_range_s of centre_s, to 0.1 ms. signs: of pan and tilt, -1 reverses one.
+// The best shift within half_range_s of centre_s, to 0.1 ms. signs: factors of pan and tilt; -1
+// reverses one.
 [[nodiscard]] MotionMatch match_motion(const std::vector<ImageMotion>& motion,
                                        const TrajectorySpline& telemetry, double centre_s,
                                        double half_range_s, const Vector2<double>& signs = {1, 1});
 
-// Whether pan and tilt of the telemetry count the other way than the image shows.
+// Axes whose telemetry counts opposite to the image's motion.
 struct ReversedAxes {
   bool pan = false;
   bool tilt = false;
 };
 
-// The axes with whose signs reversed the telemetry leaves much less of the image's motion unexplained
-// than as it is, `match`. None where the recording does not tell. Searches three times as long as match_motion().
+// The axes to reverse so that telemetry leaves much less of the image's motion unexplained than it
+// does as it is, `match`. None if the recording does not show it. Takes three times as long as
+// match_motion().
 [[nodiscard]] ReversedAxes reversed_axes(const std::vector<ImageMotion>& motion,
                                          const TrajectorySpline& telemetry,
                                          const MotionMatch& match);

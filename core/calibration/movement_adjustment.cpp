@@ -37,7 +37,7 @@ MovementAdjustment::MovementAdjustment(MovementData data, const ZoomCurve& curve
       spline_(spline_over(data_)),
       telemetry_sigma_(data_.pan_tilt_sigma_rad > 0 ? data_.pan_tilt_sigma_rad : kStartSigma_rad) {
   for (int i = 0; i < spline_.control_points(); ++i) {
-    // What a control point moves begins three knots before it.
+    // A control point has an effect from three knots before it on.
     const auto knot = [&](int k) {
       const double spacing = (spline_.end_s() - spline_.begin_s()) / spline_.segments();
       return spline_.begin_s() + k * spacing;
@@ -115,7 +115,7 @@ void MovementAdjustment::mark_outliers(const Normal& at) {
         square >= 0 &&
         square < kOutlierSigmas * kOutlierSigmas * std::max(1.0, std::pow(pixel_sigma_ratio_, 2));
   }
-  // What is seen once says nothing.
+  // A landmark seen once says nothing.
   std::vector<int> sightings(landmarks_.size(), 0);
   for (const AdjustmentObservation& seen : observations) {
     if (seen.used) ++sightings[static_cast<std::size_t>(seen.landmark)];

@@ -1,11 +1,12 @@
 #pragma once
-// MovementAdjustment: bundle adjustment of one movement of the zoom (zoom_movement.h). Minimised is
-//   sum |A^-1 (u - pi(R(p(t + v l))^T d; f, k, c at t + v l))|^2 / sigma_px^2      A as in linearisation.h, f's rate in it
-// + sum |wrap(measured - scale p)|^2 / sigma_rad^2
-// + sum |n_i|^2 / sigma_i^2    of what distortion and centre have beside the curve, at places along the movement
-// over splines of pan, tilt and log f, n and directions d. Robustly first, then by least squares on what is left. Of the unknowns
-// come the control points' pan and tilt, then log f of the first rest, of the second, of the control points between, then n.
-// Allocates.
+// MovementAdjustment: bundle adjustment of one movement of the zoom (zoom_movement.h). It minimises
+//   sum |A^-1 (u - pi(R(p(t + v l))^T d; f, k, c at t + v l))|^2 / sigma_px^2
+// + sum |measured - scale p|^2 / sigma_rad^2           telemetry, unwrapped, with a robust loss
+// + sum |n_i|^2 / sigma_i^2
+// over splines of pan, tilt and log f (constant at either dwell), directions d, and n: distortion
+// and centre minus the curve's at places along the movement, sigma_i from the curve. A: as in
+// linearisation.h, with f's rate. Line delay, axes, scales and clock offset are fixed.
+// The loss of observations is robust first, then least squares on the inliers. Allocates.
 
 #include <Eigen/Core>
 #include <string>
@@ -26,20 +27,22 @@ class ZoomMotionSpline : public CubicSpline<3, ZoomMotionSpline> {
 
 struct MovementData {
   AdjustmentData input;             // frames' times, tracks, telemetry with unwrapped angles
-  std::vector<ZoomReading> passed;  // image clock, from the first rest's last to the second's first
-  double begin_s = 0;               // image clock, of what is looked at
-  double rest_ends_s = 0;           // until then f is that of the first rest
-  double rest_begins_s = 0;         // from then on that of the second
+  std::vector<ZoomReading> passed;  // image clock; last of the first dwell to first of the second
+  double begin_s = 0;               // image clock; the span that is used
+  double rest_ends_s = 0;           // until then f is the first dwell's
+  double rest_begins_s = 0;         // from then on f is the second dwell's
   double end_s = 0;
   double frame_period_s = 0;
-  double pan_tilt_sigma_rad = 0;  // 0: as the residuals have it
+  double pan_tilt_sigma_rad = 0;  // 0: estimated from the residuals
   int width = 0;                  // px
   int height = 0;
 };
 
+// Order of the unknowns: the control points' pan and tilt, log f of the first dwell, of the second,
+// of the control points between, n.
 class MovementAdjustment {
  public:
-  // curve gives the start, distortion and centre, and what is shared; it must outlive this.
+  // curve: start values, distortion, centre and shared parameters. It must outlive this object.
   MovementAdjustment(MovementData data, const ZoomCurve& curve);
 
   // False and one line in *error: no minimum, or something is left undetermined.
@@ -58,18 +61,18 @@ class MovementAdjustment {
   }
   // d log f / d unknowns.
   [[nodiscard]] Eigen::VectorXd log_f_row(double time_s) const;
-  // Of the unknowns, residuals that are larger than they say accounted for.
+  // Of the unknowns; enlarged if the residuals exceed their sigmas.
   [[nodiscard]] const Eigen::MatrixXd& covariance() const { return covariance_; }
   [[nodiscard]] double pixel_sigma_ratio() const { return pixel_sigma_ratio_; }
 
  private:
-  // Distortion and centre at a time, and how they go with n: a share of two neighbours.
+  // Distortion and centre at a time. n is interpolated between two neighbouring places.
   struct LensPlace {
     Vector3<double> quantities;  // corner distortion, centre
     int first = 0;
     double share = 0;  // of the second
   };
-  // One residual: its two components by up to 18 unknowns and the landmark's two.
+  // One residual, with its derivatives by up to 18 unknowns and by the landmark's two.
   struct Row {
     Vector2<double> error;
     std::vector<int> index;
@@ -85,17 +88,17 @@ class MovementAdjustment {
     std::vector<Vector2<double>> g_landmark;
     std::vector<std::vector<int>> touched;
     std::vector<std::vector<Vector2<double>>> H_touched;  // of the landmark by the unknown
-    std::vector<double> pixel_square;  // of each observation, in its sigmas; negative: none
+    std::vector<double> pixel_square;  // residual^2 in sigma^2; negative: no projection
     double telemetry_square = 0;
     int telemetry_count = 0;
   };
 
-  // Along the movement, of what distortion and centre have beside the curve.
+  // Places along the movement at which n is estimated.
   static constexpr int kPlaces = 5;
   static int point_row(int control_point) { return 2 * control_point; }
 
   [[nodiscard]] ZoomMotionSpline::Basis basis(double time_s) const { return spline_.basis(time_s); }
-  // Between which two readings, and the second's share; before and after all of them the first and the last.
+  // The two readings around a time, and the second's share. Clamped at the ends.
   struct Passing {
     std::size_t second;
     double share;
@@ -103,9 +106,9 @@ class MovementAdjustment {
   [[nodiscard]] Passing passing_at(double time_s) const;
   [[nodiscard]] LensPlace lens_at(double time_s) const;
   [[nodiscard]] Camera<double> camera_at(double log_f, const LensPlace& lens) const;
-  // k of a unit of corner distortion.
+  // k per unit of corner distortion.
   [[nodiscard]] double per_corner_at(double focal_length) const;
-  // Where log f and n begin among the unknowns.
+  // Index of the first log f and of the first n among the unknowns.
   [[nodiscard]] int first_log_f() const { return 2 * spline_.control_points(); }
   [[nodiscard]] int first_beside() const { return first_log_f() + log_f_unknowns_; }
   [[nodiscard]] int log_f_unknown(int control_point) const;
@@ -126,14 +129,15 @@ class MovementAdjustment {
   const ZoomCurve& curve_;
   Calibration shared_;
   ZoomMotionSpline spline_;
-  std::vector<int> log_f_unknown_;  // of each control point, from 0
+  std::vector<int> log_f_unknown_;  // of each control point, relative to first_log_f()
   int log_f_unknowns_ = 0;
-  // Along the movement: times, readings' share of the way, distortion and centre of the curve there.
+  // Along the movement: times, position between the end readings (0 to 1), the curve's distortion
+  // and centre.
   std::vector<double> way_time_s_;
   std::vector<double> way_share_;
   std::vector<Vector3<double>> way_quantities_;
   Eigen::Matrix3Xd beside_;        // n
-  Eigen::Matrix3Xd beside_sigma_;  // of it
+  Eigen::Matrix3Xd beside_sigma_;  // sigma of n
   std::vector<Vector3<double>> landmarks_;
   double telemetry_sigma_ = 0;
   int unknowns_ = 0;

@@ -1,4 +1,4 @@
-// The normal equations of MovementAdjustment: residuals by unknowns, landmarks eliminated.
+// The normal equations of MovementAdjustment: residuals by unknowns, with landmarks eliminated.
 
 #include <Eigen/Cholesky>
 #include <algorithm>
@@ -11,7 +11,7 @@
 namespace alidade::internal {
 namespace {
 
-constexpr double kLogFSigma = 0.5;  // of the start: what no frame sees stays near the curve
+constexpr double kLogFSigma = 0.5;  // where no frame sees log f, it stays near the start
 constexpr double kLostPixelSquare = 1e6;
 
 double half_diagonal_of(const MovementData& data) {
@@ -209,7 +209,7 @@ void MovementAdjustment::linearise(double loss_px, bool with_derivatives, Normal
     out->g[a] -= n / (sigma * sigma);
   }
   if (!with_derivatives) return;
-  // Nothing is said of where log f is, only that no step goes far.
+  // Limits the steps of log f without a prior of its value.
   for (int i = 0; i < log_f_unknowns_; ++i) {
     const int a = first_log_f() + i;
     out->H(a, a) += 1 / (kLogFSigma * kLogFSigma);

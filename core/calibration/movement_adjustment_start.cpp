@@ -1,4 +1,4 @@
-// Where MovementAdjustment starts: along the curve, with telemetry's angles.
+// Start values of MovementAdjustment: log f from the curve, angles from telemetry.
 
 #include <Eigen/Cholesky>
 #include <algorithm>
@@ -30,7 +30,7 @@ void MovementAdjustment::set_places() {
   }
   beside_ = Eigen::Matrix3Xd::Zero(3, kPlaces);
   beside_sigma_ = Eigen::Matrix3Xd::Zero(3, kPlaces);
-  // What is taken as exact stays so, as far as the normal equations can tell.
+  // What the curve takes as exact gets a small sigma, so that the normal equations stay regular.
   const Vector3<double> least(1e-6, 1e-4, 1e-4);
   for (int i = 0; i < kPlaces; ++i) {
     Vector3<double> sigma = Vector3<double>::Zero();
@@ -39,7 +39,7 @@ void MovementAdjustment::set_places() {
   }
 }
 
-// Pan and tilt by telemetry, log f by the curve, smoothed a little.
+// Pan and tilt from telemetry, log f from the curve, slightly smoothed.
 void MovementAdjustment::set_start() {
   const int points = spline_.control_points();
   Eigen::MatrixXd H = Eigen::MatrixXd::Zero(points, points);
@@ -93,7 +93,7 @@ void MovementAdjustment::set_start() {
   }
 }
 
-// The mean of where the start has each.
+// Each landmark starts at the mean direction of its observations.
 void MovementAdjustment::set_landmarks() {
   auto& observations = data_.input.observations;
   std::vector<char> is_seen(data_.input.frame_time_s.size(), 0);

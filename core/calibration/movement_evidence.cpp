@@ -9,11 +9,11 @@
 namespace alidade::internal {
 namespace {
 
-// As good as nothing is said of them between dwells: corner distortion, and centre in px.
+// Loose sigmas of what is not observed between dwells: corner distortion, and centre in px.
 constexpr double kAnyDistortion = 10;
 constexpr double kAnyCentre_px = 1e4;
 
-// The node of the curve itself at a reading.
+// The node of the curve itself (without eps) at a reading.
 std::optional<int> node_between(double reading, const ZoomEvidence& evidence) {
   for (int i = 0; i < evidence.nodes(); ++i) {
     const auto at = static_cast<std::size_t>(i);

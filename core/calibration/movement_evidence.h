@@ -1,12 +1,12 @@
 #pragma once
-// What movements of the zoom say of the nodes of a curve. With g the curve, v_A and v_B log f at the rests (nodes with their eps),
-// l_i log f where reading z_i was passed, w the way between the rests in log f, 0 to 1:
-//   l_i = g(z_i) + eps(w_i) + rate_i late + noise_i
-// eps(0) = v_A - g(z_A) and eps(1) = v_B - g(z_B): f does not jump where a movement begins or ends. Between, eps has the variance
-// repeatability^2 as anywhere and the covariance repeatability^2 (1 - |w - w'|): between rests that are known, a line and a
-// Brownian bridge. `late`, by how much the reading is older than the angles (zoom_fit.h) and the clock offset off, is one for all
-// movements.
-// noise: MovementObservation::covariance. So there are nodes of g at each z_i and at the rests' readings. Allocates.
+// add_movements(): adds to a curve's evidence what movements of the zoom show. With g the curve,
+// v_A and v_B log f at the dwells, l_i log f where reading z_i was passed, w the way in log f (0 to
+// 1):
+//   l_i = g(z_i) + eps(w_i) + rate_i late + noise_i        (derivation: docs/calibration.md)
+// f does not jump: eps(0) = v_A - g(z_A), eps(1) = v_B - g(z_B). Between, eps has the covariance
+// repeatability^2 (1 - |w - w'|). `late` is one number for all movements: the reading's age against
+// the angles (zoom_fit.h) plus the clock offset's error. noise: MovementObservation::covariance.
+// The curve gets nodes of g at each z_i and at the dwells' readings. Allocates.
 
 #include <cstddef>
 #include <vector>
@@ -16,8 +16,9 @@
 
 namespace alidade::internal {
 
-// clock_sigma_s: of the clock offset. node_of: of each calibration; changed as nodes are inserted. Readings beyond what a curve has room for are left out.
-// False: a covariance is not positive.
+// clock_sigma_s: of the clock offset. node_of: the node of each calibration; updated as nodes are
+// inserted. Readings for which the curve has no room are left out. False: a covariance is not
+// positive.
 [[nodiscard]] bool add_movements(const std::vector<MovementObservation>& movements,
                                  const ZoomFitOptions& options, double clock_sigma_s,
                                  std::vector<int>* node_of, ZoomEvidence* evidence);

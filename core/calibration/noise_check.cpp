@@ -72,7 +72,7 @@ double repetition(const AdjustmentData& data, std::size_t landmarks, const Linea
   for (auto& track : tracks) {
     std::sort(track.begin(), track.end(),
               [](const Seen& a, const Seen& b) { return a.frame < b.frame; });
-    // The landmark's direction took the mean out of both components: each product falls short by 1 / size.
+    // The landmark's direction absorbed the mean of both components: each product lacks 1 / size.
     const double taken = track.empty() ? 0 : 2.0 / static_cast<double>(track.size());
     for (std::size_t i = 0; i < track.size(); ++i) {
       for (std::size_t j = i + 1; j < track.size(); ++j) {

@@ -1,12 +1,5 @@
 #pragma once
-// Do the residuals agree with the noise that was stated? Two looks at them:
-//   noise_ratios   how large they are against it, redundancy accounted for: of m residuals with n unknowns among them
-//                  m - n degrees of freedom remain (Helmert). The unknowns are shared out: telemetry decides
-//                  trace(H^-1 H_telemetry) of them, the observations the rest.
-//   repetition     whether a landmark errs alike in neighbouring frames (a patch that looks different in another
-//                  light, or is moved across another part of the lens): such errors are averaged less than the
-//                  count of observations says.
-// Derivations: docs/calibration.md. Allocates.
+// Do the residuals agree with the stated noise? Derivations: docs/calibration.md. Allocates.
 
 #include <cstddef>
 
@@ -14,12 +7,13 @@
 
 namespace alidade::internal {
 
-// Residual over stated noise, and the degrees of freedom that say so.
+// Residual over stated noise, and the degrees of freedom behind it.
 struct NoiseRatio {
   double ratio = 1;
   double redundancy = 0;
 
-  // Beyond chance: ratio^2 has a standard deviation of sqrt(2 / redundancy).
+  // Whether the ratio is off beyond chance: ratio^2 has a standard deviation of
+  // sqrt(2 / redundancy).
   [[nodiscard]] bool contradicts() const;
 };
 
@@ -27,16 +21,21 @@ struct NoiseRatios {
   NoiseRatio pixel;
   NoiseRatio telemetry;
 
-  // Enough of both to tell.
+  // Whether there is enough redundancy of both.
   [[nodiscard]] bool known() const { return pixel.redundancy >= 10 && telemetry.redundancy >= 10; }
 };
 
-// Of a linearisation at the minimum of least squares; telemetry_unknowns by Adjustment::covariance().
+// Size of the residuals against the stated noise. Of m residuals with n unknowns, m - n degrees of
+// freedom remain (Helmert). Telemetry determines trace(H^-1 H_telemetry) of the unknowns
+// (telemetry_unknowns, by Adjustment::covariance()), the observations the rest. at: the minimum of
+// least squares.
 [[nodiscard]] NoiseRatios noise_ratios(const AdjustmentData& data, const AdjustmentState& state,
                                        const Linearisation& at, double telemetry_unknowns);
 
-// How many observations of a landmark in neighbouring frames are worth one: 1 + 2 sum of the correlations of their
-// errors, as long as there are any; about 1 if they are independent. landmarks: how many there are.
+// How many observations of a landmark in neighbouring frames count as one: 1 + 2 sum of the
+// correlations of their errors, up to the first negligible one. About 1 for independent errors.
+// Errors repeat if a patch looks different in another light or moves across another part of the
+// lens; they then average out less than the count of observations says. landmarks: their number.
 [[nodiscard]] double repetition(const AdjustmentData& data, std::size_t landmarks,
                                 const Linearisation& at);
 

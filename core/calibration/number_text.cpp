@@ -17,7 +17,7 @@ std::string text_of(double value, int digits) {
   return stream.str();
 }
 
-// That show two digits of it.
+// Decimals that show two digits of sigma.
 int decimals_for(double sigma) {
   return std::clamp(1 - static_cast<int>(std::floor(std::log10(sigma))), 0, 12);
 }
@@ -56,7 +56,7 @@ std::string rounded_text(double value, int decimals) {
 }
 
 std::string value_text(double value, double sigma) {
-  // As many as a conversion between units leaves right; + 0: no -0.
+  // The digits that a conversion between units leaves right. Adding 0 avoids -0.
   constexpr int kExactDigits = 10;
   return sigma > 0 ? rounded_text(value, decimals_for(sigma)) : text_of(value + 0, kExactDigits);
 }

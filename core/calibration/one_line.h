@@ -1,6 +1,6 @@
 #pragma once
-// An error as one line of a bearable length, whatever the file it tells of holds: control characters,
-// which a terminal would obey, become '?'. What is beyond ASCII stays.
+// An error as one line of limited length, whatever the file it quotes holds. Control characters,
+// which a terminal would obey, become '?'. Characters beyond ASCII stay.
 
 #include <algorithm>
 #include <cstddef>

@@ -34,7 +34,7 @@ EstimateRange plausible_range(Parameter parameter) {
   }
 }
 
-// Of one standard deviation, in the unit of the value.
+// Limit of a standard deviation, in the unit of the value.
 double largest_sigma(Parameter parameter) {
   switch (parameter) {
     case Parameter::kPanAxis0:
@@ -146,7 +146,7 @@ class CalibrationReader {
                            short_text(nominal.x()) + ", " + short_text(nominal.y()) + ", " +
                            short_text(nominal.z()) + "]; base axes are forward, right, down");
     }
-    // What a person rounded is made a unit vector; what a program wrote stays as it is, bit by bit.
+    // Normalises what a person rounded. What a program wrote stays as it is, bit by bit.
     if (std::abs(norm - 1) > 1e-15) axis /= norm;
     set_pair_of_sigmas(entry, name, first);
     return axis;

@@ -1,20 +1,21 @@
 #pragma once
-// Covariance to information and back, of numbers some of which are exact, whose units differ by many orders of magnitude: px beside
-// s/row. Pure; allocates.
+// Covariance to information and back. Some of the quantities may be exact, and their units may
+// differ by many orders of magnitude (px beside s/row). Pure; allocates.
 
 #include <Eigen/Core>
 #include <vector>
 
 namespace alidade::internal {
 
-// Rows of positive variance, in order.
+// The rows of positive variance, in order.
 [[nodiscard]] std::vector<int> free_places(const Eigen::MatrixXd& covariance);
 
-// Of a symmetric positive definite matrix, in units of its diagonal's roots; empty if it is none.
+// Inverse of a symmetric positive definite matrix, computed with its diagonal scaled to 1. Empty if
+// the matrix is not positive definite.
 [[nodiscard]] Eigen::MatrixXd scaled_inverse(const Eigen::MatrixXd& matrix);
 
-// scaled_inverse() of the rows and columns at `places`, where it stands in a matrix of the same size that is zero elsewhere; empty if
-// that part is not positive definite, or there are no places.
+// scaled_inverse() of the rows and columns at `places`, embedded in a matrix of full size that is
+// zero elsewhere. Empty if that part is not positive definite or `places` is empty.
 [[nodiscard]] Eigen::MatrixXd inverse_over(const Eigen::MatrixXd& matrix,
                                            const std::vector<int>& places);
 

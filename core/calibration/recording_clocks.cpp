@@ -8,7 +8,7 @@ namespace alidade::internal {
 
 namespace {
 
-// The items' stamps and numbers added to what is known of the stream.
+// Fits the items' stamps and sequence numbers, given what is known of the stream.
 template <class Item>
 ClockLine fit_stream(const std::vector<Item>& items, const std::vector<std::size_t>& used,
                      StampNoise stamps, ClockInput clock) {

@@ -1,6 +1,6 @@
 #pragma once
-// Second stage of calibrate(): the clocks of a recording's two streams (clock_line.h), and the times that they give to
-// frames and telemetry. Allocates.
+// Second stage of calibrate(): fits the clocks of a recording's two streams (clock_line.h), and
+// gives frames and telemetry their times. Allocates.
 
 #include "core/calibration/calibration_types.h"
 #include "core/calibration/clock_line.h"
@@ -13,16 +13,16 @@ struct RecordingClocks {
   ClockLine telemetry;
   double telemetry_common_sigma_s = 0;  // CalibrationNoise
 
-  // What the stamps leave open of the clock offset, s^2: no motion tells more.
+  // s^2; the variance of the clock offset due to the stamps. Motion does not reduce it.
   [[nodiscard]] double stamps_variance() const;
 };
 
-// Relative variance of the period of a steady clock; 0 without one.
+// Relative variance of the period of a steady clock; 0 if the clock is not steady.
 [[nodiscard]] double period_variance(const ClockLine& clock);
 
 [[nodiscard]] StreamTiming timing_of(const ClockLine& clock);
 
-// Sets the frames' times, the telemetry and the reference of selected->data.
+// Sets frame_time_s, telemetry and reference_s of selected->data.
 [[nodiscard]] RecordingClocks fit_clocks(const CalibrationInput& input,
                                          const CalibrationOptions& options,
                                          SelectedInput* selected);

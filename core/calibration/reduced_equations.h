@@ -1,11 +1,12 @@
 #pragma once
-// ReducedEquations: S x = b with S = H - Y Y^T (landmark_elimination.h) for long recordings. S is dense where a path returns to what it saw
-// before, H and Y are sparse: by conjugate gradients, which need products with S alone, time and memory grow with the observations, and not with
-// the square or the cube of the control points.
-// The preconditioner is S with the control points' part taken from H, as if landmarks were known, and the parameters' rows as they are:
-//   M = [ B  C^T ]   B of H: a band. As B is more than S has there, M is positive definite where S is.
-//       [ C   D  ]   C, D of S
-// Some 20 to 40 steps at any length (docs/measurements.md). Allocates.
+// ReducedEquations: S x = b with S = H - Y Y^T (landmark_elimination.h) for long recordings. S is
+// dense where a path returns to what it saw before; H and Y are sparse. Conjugate gradients need
+// only products with S. So time and memory grow with the observations, not with the square or cube
+// of the control points.
+// Preconditioner: M = [B C^T; C D], with B the control points' block of H (a band, as if landmarks
+// were known), C and D the parameters' rows of S. B is larger than that block of S, so M is
+// positive definite if S is. Some 20 to 40 steps at any length (docs/measurements.md).
+// Allocates. Derivation: docs/calibration.md.
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
@@ -19,20 +20,22 @@
 
 namespace alidade::internal {
 
-// Of a matrix whose order keeps it sparse as it is.
+// Cholesky of a matrix whose own order keeps it sparse.
 using OrderedCholesky =
     Eigen::SimplicialLLT<Eigen::SparseMatrix<double>, Eigen::Lower, Eigen::NaturalOrdering<int>>;
 
 class ReducedEquations {
  public:
-  // Every diagonal element of H multiplied by 1 + damping; `in` must outlive it. False if M is not positive definite.
+  // Every diagonal element of H is multiplied by 1 + damping. `in` must outlive this object. False
+  // if M is not positive definite.
   [[nodiscard]] bool set(const Linearisation& in, double damping);
 
   [[nodiscard]] const Eigen::VectorXd& g() const { return g_; }
-  // Of S, the parameters' own.
+  // The parameters' block of S.
   [[nodiscard]] const GlobalMatrix& parameters() const { return corner_; }
 
-  // Until the error is some `tolerance` of x, both by the norm x^T S x. False where too many steps do not suffice.
+  // Iterates until the error is some `tolerance` of x, both by the norm x^T S x. False if that
+  // takes too many steps.
   [[nodiscard]] bool solve(const Eigen::VectorXd& b, double tolerance, Eigen::VectorXd* x) const;
 
  private:
@@ -42,7 +45,8 @@ class ReducedEquations {
 
   const Linearisation* in_ = nullptr;
   double damping_ = 0;
-  // Y, of touched control points one after the other, and of the parameters, by landmark: zero where it is not observed.
+  // Y: of the touched control points in sequence, and of the parameters by landmark (zero if not
+  // observed).
   std::vector<Matrix2<double>> Y_points_;
   std::vector<CameraRows> Y_camera_;
   Eigen::VectorXd g_;

@@ -9,8 +9,8 @@
 namespace alidade::internal {
 
 double angle_resolution(const std::vector<AdjustmentTelemetry>& telemetry) {
-  // Steps of a rounding in the file, or of the arithmetic, are none of the device's.
-  constexpr double kSmallest_rad = 2e-7;  // rad
+  // Smaller steps come from rounding in a file or in arithmetic, not from the device.
+  constexpr double kSmallest_rad = 2e-7;
   double resolution = 0;
   for (int axis = 0; axis < 2; ++axis) {
     std::vector<double> angles;
@@ -47,7 +47,7 @@ std::vector<AdjustmentTelemetry> add_crossings(const std::vector<AdjustmentTelem
                                                const TrajectorySpline& trajectory, double shift_s,
                                                std::vector<std::size_t>* source) {
   constexpr double kDither = 0.25;
-  // Share of the resolution below which no device rounds evenly.
+  // Devices round unevenly by this share of the resolution.
   constexpr double kUnevenness = 0.02;
   constexpr double kNone = std::numeric_limits<double>::infinity();
   std::vector<AdjustmentTelemetry> items;

@@ -1,6 +1,6 @@
 #pragma once
-// Telemetry whose angles come in whole steps (its resolution): what it says, and how uncertain that is.
-// Angles rad, times s. Allocates.
+// Telemetry whose angles are multiples of a step (its resolution): what it measures, and how
+// uncertain that is. Angles rad, times s. Allocates. Derivation: docs/calibration.md.
 
 #include <cstddef>
 #include <vector>
@@ -9,22 +9,24 @@
 
 namespace alidade::internal {
 
-// The step between neighbouring readings if all angles come in whole steps, otherwise 0.
+// The step of which all readings of an axis are multiples; the larger one of the two axes; 0 if
+// there is none.
 [[nodiscard]] double angle_resolution(const std::vector<AdjustmentTelemetry>& telemetry);
 
-// The sigma of each sample: white noise, the rounding (resolution^2 / 12), and the stamp's own error, at the
+// Sets each sample's sigma: white noise, rounding (resolution^2 / 12), and the stamp's error at the
 // smoothed rate.
 void set_telemetry_sigma(double white_sigma, double resolution, double stamp_sigma_s,
                          const TrajectorySpline& smooth,
                          std::vector<AdjustmentTelemetry>* telemetry);
 
-// What rounded telemetry says without the bias of its rounding. Where an axis moves less than two steps of the
-// resolution from sample to sample, rounding errors are no noise: readings stay off to one side while it turns
-// round. But between two neighbouring readings it passed half-way between them: that is added, as a sample at the
-// middle of their times with the uncertainty of the moment (trajectory time = telemetry time - shift_s). All equal
-// readings in a row together keep the weight of one with a sigma of the resolution: enough to hold what
-// nothing else holds. source[i]: index of the sample (the first of the two) that gave item i. Noise of a quarter of
-// the resolution or more dithers the readings: they stay as they are.
+// Removes the bias of rounding. Where an axis moves less than two steps from sample to sample,
+// rounding errors are not noise: readings stay off to one side while the axis reverses. But
+// between two readings one step apart it passed half-way between them. That is added as a sample at
+// the middle of their times, with the uncertainty of the moment (trajectory time = telemetry time -
+// shift_s). All equal readings in a row together keep the weight of one with a sigma of the
+// resolution: enough to hold what nothing else holds. White noise of a quarter of the resolution or
+// more dithers the readings: they stay as they are. source[i]: index of the sample (the first of
+// the two) behind item i.
 [[nodiscard]] std::vector<AdjustmentTelemetry> add_crossings(
     const std::vector<AdjustmentTelemetry>& telemetry, double resolution, double white_sigma,
     const TrajectorySpline& trajectory, double shift_s, std::vector<std::size_t>* source);

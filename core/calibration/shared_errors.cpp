@@ -9,10 +9,10 @@ namespace alidade::internal {
 
 namespace {
 
-// Fewer clusters than that tell too little of a variance.
+// With fewer clusters a variance is known too poorly.
 constexpr double kLeastFreedom = 4;
 
-// covariance^-1 of the parameters that have one, zero for the others.
+// Inverse covariance of the parameters that have one, zero for the others.
 GlobalMatrix information_of(const GlobalMatrix& covariance) {
   GlobalVector scale = GlobalVector::Zero();
   GlobalMatrix scaled = GlobalMatrix::Identity();
@@ -27,8 +27,7 @@ GlobalMatrix information_of(const GlobalMatrix& covariance) {
   return scale.asDiagonal() * scaled.ldlt().solve(GlobalMatrix::Identity()) * scale.asDiagonal();
 }
 
-// What is beyond chance, known from few clusters: a variance that is told by n of them is on average too small by
-// (n - 2) / n where it is divided by.
+// Growth beyond 1, corrected for few clusters: with n of them the mean of 1/growth is n / (n - 2).
 double excess(const ErrorGrowth& growth, int parameter) {
   const double n = growth.freedom[parameter];
   if (n < kLeastFreedom) return 0;
@@ -55,7 +54,7 @@ ErrorGrowth error_growth(const std::vector<int>& cluster, int clusters, const Ad
   GlobalVector sum = GlobalVector::Zero();
   GlobalVector sum_of_squares = GlobalVector::Zero();
   for (std::size_t c = 0; c < count; ++c) {
-    // The parameters follow the cluster's errors, and leave that much smaller residuals.
+    // The parameters follow the cluster's own errors, which makes its residuals that much smaller.
     const GlobalVector left =
         (expected[c] - expected[c] * information * expected[c]).diagonal().cwiseMax(0.0);
     square += moved[c].cwiseAbs2();

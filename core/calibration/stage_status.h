@@ -1,5 +1,5 @@
 #pragma once
-// Whether a stage of calibrate() went well, and if not, what the result says of it.
+// The result of one stage of calibrate(): ok, or a refusal with its message.
 
 #include <string>
 

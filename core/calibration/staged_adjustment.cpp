@@ -16,7 +16,7 @@ namespace alidade::internal {
 
 namespace {
 
-// Both components of an error together; a Gaussian one exceeds this once in 10,000.
+// Limit of an error's squared norm, in sigmas^2; a Gaussian one exceeds it once in 10,000.
 const double kOutlierSquaredError = 2 * std::log(1e4);
 // Cauchy scale (sigmas) of the robust adjustment.
 constexpr double kRobustScale = 3;
@@ -101,7 +101,7 @@ bool StagedAdjustment::settle_on_inliers() {
   return true;
 }
 
-// True if the residuals asked for knots and got them.
+// True if segments were split.
 bool StagedAdjustment::split_knots() {
   TrajectorySpline& trajectory = adjusted_.state.trajectory;
   const KnotChoice choice = choose_knots(selected_->data, trajectory, adjusted_.at);
@@ -122,7 +122,7 @@ void StagedAdjustment::replace_rounded_telemetry() {
   selected_->telemetry_index = std::move(source);
 }
 
-// Outlier or not by the residuals at hand; true if any changed.
+// Marks outliers by the residuals at hand; true if any mark changed.
 bool StagedAdjustment::mark_outliers() {
   const Linearisation& at = adjusted_.at;
   AdjustmentData& data = selected_->data;
@@ -142,7 +142,7 @@ bool StagedAdjustment::mark_outliers() {
   return changed;
 }
 
-// Residuals that contradict the stated noise are believed. True if anything changed.
+// Replaces noise levels that the residuals contradict. True if anything changed.
 bool StagedAdjustment::correct_noise(CalibrationQuality* quality) {
   AdjustmentData& data = selected_->data;
   const NoiseRatios ratios = noise_ratios(data, adjusted_.state, adjusted_.at, telemetry_unknowns_);

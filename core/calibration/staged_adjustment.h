@@ -1,14 +1,6 @@
 #pragma once
-// Fifth stage of calibrate(): the adjustment (adjustment.h), from afar to close by.
-//   adjust_robustly     Cauchy loss, its scale from the residuals' medians down to 3 sigmas; the spline's segments are
-//                       split where the residuals ask for it (knot_choice.h). Rounded telemetry is then replaced by its
-//                       crossings (rounded_telemetry.h): readings hold a trajectory everywhere, crossings only from
-//                       close by. Outliers are marked by what comes out.
-//   adjust_on_inliers   least squares on the rest, outliers marked anew; noise levels that the residuals contradict
-//                       beyond chance are replaced by the residuals' (noise_check.h); covariance, grown where
-//                       residuals move the parameters together (shared_errors.h). A robust loss on good data would
-//                       inflate the sigmas that are reported.
-// Allocates; one object for each recording.
+// StagedAdjustment: fifth stage of calibrate(), the adjustment (adjustment.h) from rough start
+// values to the final covariance. Allocates; one object for each recording.
 
 #include <string>
 
@@ -28,13 +20,20 @@ struct Adjusted {
 
 class StagedAdjustment {
  public:
-  // selected must outlive it: outliers, noise and crossings are set there.
+  // selected must outlive this object, which sets outliers, noise and crossings in it.
   StagedAdjustment(const StartValues& start, const TelemetryNoise& noise, int max_knots,
                    SelectedInput* selected);
 
+  // Cauchy loss; its scale follows the residuals' medians down to 3 sigmas. Splits the spline's
+  // segments where the residuals ask for it (knot_choice.h). Then replaces rounded telemetry by its
+  // crossings (rounded_telemetry.h): readings hold a trajectory everywhere, crossings only a close
+  // one. Marks outliers at the end.
   void adjust_robustly();
 
-  // Sets the quality's steps, ratios and repetition.
+  // Least squares on the rest, with outliers marked again. Noise levels that the residuals
+  // contradict beyond chance are replaced by the residuals' (noise_check.h). The covariance grows
+  // where residuals move the parameters together (shared_errors.h). A robust loss on good data
+  // would inflate the sigmas. Sets the quality's steps, ratios and repetition.
   [[nodiscard]] StageStatus adjust_on_inliers(CalibrationQuality* quality);
 
   [[nodiscard]] const Adjusted& adjusted() const { return adjusted_; }
@@ -56,7 +55,7 @@ class StagedAdjustment {
   Adjustment adjustment_;
   Adjusted adjusted_;
   double telemetry_unknowns_ = 0;
-  bool settled_ = false;  // robustly
+  bool settled_ = false;  // by settle_robustly()
 };
 
 }  // namespace alidade::internal

@@ -16,10 +16,11 @@ namespace alidade::internal {
 
 namespace {
 
-// Telemetry is used this far before the first and after the last frame: it steadies the spline's ends.
+// Telemetry is used this far beyond the first and last frame, to hold the spline's ends.
 constexpr double kMargin_s = 0.25;
 
-// Leaves out the frames outside the telemetry, the observations they hold and the landmarks that are then seen once.
+// Leaves out frames outside the telemetry's time span, their observations, and landmarks then seen
+// once.
 void leave_out_frames_without_telemetry(double shift_s, SelectedInput* selected,
                                         CalibrationExclusions* excluded) {
   AdjustmentData& data = selected->data;
@@ -59,7 +60,7 @@ struct TimeSpan {
   double end_s = -std::numeric_limits<double>::infinity();
 };
 
-// Of the frames that are observed, on the image clock.
+// Of the observed frames, on the image clock.
 TimeSpan observed_span(const AdjustmentData& data) {
   TimeSpan span;
   for (const auto& o : data.observations) {
@@ -93,7 +94,8 @@ StageStatus find_motion(const CalibrationInput& input, const CalibrationOptions&
                         MotionStart* motion) {
   auto& telemetry = selected->data.telemetry;
   unwrap(&telemetry);
-  // Frames that no telemetry accompanies are left out once d is known; here the spans need only meet.
+  // Here the two time spans need only overlap. Frames without telemetry are left out once d is
+  // known.
   const double begin = telemetry.front().time_s;
   const double end = telemetry.back().time_s;
   double telemetry_sigma = 0;

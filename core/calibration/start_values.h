@@ -1,9 +1,10 @@
 #pragma once
-// Third and fourth stage of calibrate(): where the adjustment starts, from the data alone.
-//   find_motion    telemetry smoothed and weighed, and matched with the motion of the image: clock offset and focal
-//                  length, or why there are none
-//   start_values   what lies outside the other stream's time is left out; trajectory from the telemetry; landmarks as
-//                  medians of the observations' directions; priors (adjustment_priors.h)
+// Third and fourth stage of calibrate(): start values for the adjustment, from the data alone.
+//   find_motion    smooths and weighs telemetry and matches it with the image's motion: clock
+//                  offset and focal length, or why there are none
+//   start_values   leaves out what lies outside the other stream's time span; then trajectory from
+//                  telemetry, landmarks as medians of their observed directions, priors
+//                  (adjustment_priors.h)
 // Allocates.
 
 #include <string>
@@ -16,10 +17,10 @@
 
 namespace alidade::internal {
 
-// How the angles of the telemetry err.
+// Errors of the telemetry's angles.
 struct TelemetryNoise {
-  double resolution_rad = 0;   // 0: not rounded
-  double white_sigma_rad = 0;  // rounding apart
+  double resolution_rad = 0;   // 0: angles are not rounded
+  double white_sigma_rad = 0;  // without rounding
 };
 
 struct MotionStart {
@@ -27,7 +28,8 @@ struct MotionStart {
   MotionMatch match;
 };
 
-// Unwraps selected->data.telemetry and sets its sigmas. A refusal still has the match that was found.
+// Unwraps selected->data.telemetry and sets its sigmas. After a refusal, *motion still has the
+// match.
 [[nodiscard]] StageStatus find_motion(const CalibrationInput& input,
                                       const CalibrationOptions& options,
                                       const RecordingClocks& clocks, SelectedInput* selected,
@@ -36,7 +38,7 @@ struct MotionStart {
 struct StartValues {
   PriorKnowledge prior;
   AdjustmentState state;
-  std::string doubt;  // a question for the user, if nothing comes of it (ask_for_degrees())
+  std::string doubt;  // a question for the user if the adjustment fails (ask_for_degrees())
 };
 
 [[nodiscard]] StageStatus start_values(const CalibrationInput& input,
@@ -45,8 +47,8 @@ struct StartValues {
                                        SelectedInput* selected, CalibrationExclusions* excluded,
                                        StartValues* start);
 
-// Landmarks in the frame of the anchor, from the state's camera, mount and trajectory: medians of the directions of
-// their observations, each component by itself.
+// Sets the landmarks, in the anchor's frame, from the state's camera, mount and trajectory: medians
+// of the directions of their observations, component by component.
 void initialise_landmarks(const AdjustmentData& data, AdjustmentState* state);
 
 }  // namespace alidade::internal

@@ -1,8 +1,8 @@
 #pragma once
-// YAML, read strictly: what every file of ours has in common, whatever it says. A key is a plain word, stands once and
-// is known; a number is finite and nothing but a number (number_text.h); a mistake is one line, which names the file
-// and the line. What is asked for and how a mistake is put into words is the caller's: parse_calibration() and the
-// configuration's YamlSection. Allocates.
+// Strict YAML, common to all files of the program. A key is a plain word, known, and stands once. A
+// number is finite and nothing but a number (number_text.h). An error is one line that names the
+// file and the line. The caller decides what it reads and how errors are worded:
+// parse_calibration() and the configuration's YamlSection. Allocates.
 
 #include <yaml-cpp/yaml.h>
 
@@ -14,12 +14,12 @@
 
 namespace alidade {
 
-// One line: where, what is wrong; what would be right. Thrown by what reads, caught by read_yaml().
+// One line: where, what is wrong; what would be right. Readers throw it, read_yaml() catches it.
 struct YamlError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-// The line of a node, from 1; nothing for one that is not in the text.
+// The line of a node, counted from 1; nothing for a node that is not in the text.
 [[nodiscard]] std::optional<int> line_of(const YAML::Node& node);
 
 enum class KeyFault {
@@ -28,7 +28,7 @@ enum class KeyFault {
   kUnknown
 };
 
-// The first key of a mapping with a fault. known: which there may be; empty: any.
+// The first key of a mapping with a fault. known: the allowed keys; empty: any.
 struct FaultyKey {
   KeyFault fault;
   YAML::Node key;
@@ -36,14 +36,14 @@ struct FaultyKey {
 [[nodiscard]] std::optional<FaultyKey> find_faulty_key(const YAML::Node& map,
                                                        const std::vector<std::string>& known = {});
 
-// What is said of a text that is no YAML: `name:line: BEFORE what the parser says AFTER`.
+// Message for a text that is not YAML: `name:line: BEFORE the parser's message AFTER`.
 struct NotYaml {
   const char* before;
   const char* after;
 };
 
-// Hands the text to `read`, which may throw YamlError. False with one line in *error if it did, or if the text is not
-// YAML. name stands for the file in errors.
+// Hands the parsed text to `read`, which may throw YamlError. False and one line in *error if it
+// did, or if the text is not YAML. name stands for the file in errors.
 [[nodiscard]] bool read_yaml(const std::string& text, const std::string& name,
                              const NotYaml& not_yaml,
                              const std::function<void(const YAML::Node&)>& read,

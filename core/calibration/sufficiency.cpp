@@ -14,19 +14,20 @@ namespace alidade::internal {
 
 namespace {
 
-// Limits of use. An error of the clock offset shows at the mount's rate, one of the others over half an image.
-constexpr double kMinImageMotion_px = 5;   // px in half a second
+// Limits of use. An error of the clock offset acts at the mount's rate, one of the others over half
+// an image.
+constexpr double kMinImageMotion_px = 5;   // in half a second
 constexpr double kMinCorrelation = 0.6;    // of image motion and telemetry
-constexpr double kMinTravelShare = 0.03;   // of the image's width, of each axis
-constexpr double kGoodTravelShare = 0.25;  // what is asked for where it was less
-constexpr double kMaxAxisTurn =
-    60 * kPi / 180;                            // of an axis from its nominal: what a file may hold
-constexpr double kMinRateVariation = 0.05;     // of the rate
+constexpr double kMinTravelShare = 0.03;   // of the image's width, for each axis
+constexpr double kGoodTravelShare = 0.25;  // asked for where there was less
+// Of an axis from its nominal direction; calibration.yaml holds no more.
+constexpr double kMaxAxisTurn = 60 * kPi / 180;
+constexpr double kMinRateVariation = 0.05;     // of the largest rate
 constexpr double kMaxFieldOfViewRatio = 0.2;   // least focal length / width: 136 deg
 constexpr double kMaxFocalLengthError = 0.05;  // relative
-constexpr double kMaxClockOffsetError_s = 0.01;  // s
-constexpr double kMaxReadoutError_s = 5e-3;      // s from the first to the last row
-constexpr double kMaxDistortionError = 0.02;     // of the distance from the centre, in the corner
+constexpr double kMaxClockOffsetError_s = 0.01;
+constexpr double kMaxReadoutError_s = 5e-3;   // from the first to the last row
+constexpr double kMaxDistortionError = 0.02;  // of the distance from the centre, in the corner
 
 std::string text(const char* format, double a, double b = 0) {
   char buffer[320];
@@ -56,7 +57,7 @@ std::string reversed_text(const ReversedAxes& reversed) {
          (reversed.pan ? "pan right" : "tilt up") + " must be positive, or is the image mirrored?";
 }
 
-// Of the telemetry, all through the image's motion; at its ends where they do not meet.
+// Telemetry times of the image's motion, clamped to the telemetry's span.
 std::vector<double> times_beside(const std::vector<ImageMotion>& motion,
                                  const TrajectorySpline& telemetry, const MotionMatch& match) {
   std::vector<double> times;
@@ -68,8 +69,8 @@ std::vector<double> times_beside(const std::vector<ImageMotion>& motion,
   return times;
 }
 
-// What no calibration can be made of, or file hold: an axis that did not move after all, as what telemetry says of it is noise, or one
-// that comes out far from where a head has it.
+// Refuses what no calibration can be made of and no file can hold: an axis that did not move (its
+// telemetry is noise), or that comes out far from where a head has it.
 CalibrationStatus check_axes(const Calibration& c, const MotionExtent& motion, std::string* why) {
   const double f = c.camera.focal_length;
   const Mechanics<double> nominal;
@@ -93,9 +94,9 @@ CalibrationStatus check_axes(const Calibration& c, const MotionExtent& motion, s
   return CalibrationStatus::kOk;
 }
 
-// The direction in which the parameters are most uncertain together.
+// Describes the direction in which the parameters are most uncertain together.
 void describe_weakest(CalibrationResult* result) {
-  // Exact parameters stand apart and are never the extremes.
+  // Exact parameters are uncorrelated with all others and so never an extreme.
   const ParameterCovariance<double> correlation = correlation_of(result->calibration.covariance);
   const Eigen::SelfAdjointEigenSolver<ParameterCovariance<double>> eigen(correlation);
   const auto& values = eigen.eigenvalues();
@@ -106,7 +107,7 @@ void describe_weakest(CalibrationResult* result) {
   direction.cwiseAbs().maxCoeff(&strongest);
   std::string words;
   for (int i = 0; i < kParameterCount; ++i) {
-    // Half the strongest's share or more takes part.
+    // Parameters with half the share of the strongest or more take part.
     if (std::abs(direction[i]) < 0.5 * std::abs(direction[strongest])) continue;
     const bool up = direction[i] * direction[strongest] > 0;
     words += words.empty() ? "" : " with ";
@@ -120,7 +121,7 @@ void describe_weakest(CalibrationResult* result) {
 
 MotionExtent measure_motion(const TrajectorySpline& trajectory,
                             const std::vector<double>& times_s) {
-  constexpr double kApart = 0.01;  // of the times, at either end of the range
+  constexpr double kApart = 0.01;  // of the times, cut at either end of the range
   std::array<std::vector<double>, 2> angles;
   Vector2<double> sum = Vector2<double>::Zero();
   Vector2<double> squares = Vector2<double>::Zero();
@@ -149,7 +150,7 @@ MotionExtent measure_motion(const TrajectorySpline& trajectory,
 }
 
 std::string ask_for_degrees(double focal_length, int width) {
-  // Read as radians, degrees make any telephoto lens a wide one.
+  // Degrees that are read as radians make a telephoto lens look like a wide one.
   if (focal_length > 3 * width) return "";
   return text(" Are the angles in degrees? In radians the focal length would be about %.0f px.",
               focal_length * 180 / kPi);
@@ -184,7 +185,7 @@ CalibrationStatus check_motion(const std::vector<ImageMotion>& motion,
         in_px);
     return CalibrationStatus::kBadInput;
   }
-  // Only with rates above what smoothed noise makes of rest.
+  // Only if image and telemetry correlate: otherwise the rates may be smoothed noise.
   if (match.correlation > kMinCorrelation &&
       extent.varying_rate.norm() < kMinRateVariation * rate) {
     *why =

@@ -34,7 +34,7 @@ std::optional<TrajectorySpline> fit_telemetry(const std::vector<AdjustmentTeleme
     if (time >= begin_s && time <= end_s) inside.push_back(&sample);
   }
   if (inside.size() < 8) return std::nullopt;
-  // Segments without enough samples to hold them are joined.
+  // Segments with too few samples are joined with the next.
   constexpr int kSamplesPerSegment = 2;
   const double length = end_s - begin_s;
   const int segments = std::max(1, static_cast<int>(std::ceil(length / spacing_s)));
@@ -51,7 +51,7 @@ std::optional<TrajectorySpline> fit_telemetry(const std::vector<AdjustmentTeleme
     knots.push_back(begin_s + length * (s + 1) / segments);
     held = 0;
   }
-  // The last knot found becomes the end, whatever follows it.
+  // The end replaces the last knot.
   if (knots.size() > 1) knots.pop_back();
   knots.push_back(end_s);
 
@@ -72,7 +72,7 @@ std::optional<TrajectorySpline> fit_telemetry(const std::vector<AdjustmentTeleme
         }
       }
     }
-    // Keeps what few samples reach from swinging: a share of 1e-6 for small changes between neighbours.
+    // Holds control points with few samples: a weight of 1e-6 on differences between neighbours.
     for (int a = 0; a < points; ++a) {
       entries.emplace_back(a, a, a == 0 || a == points - 1 ? 1e-6 : 2e-6);
       if (a > 0) entries.emplace_back(a, a - 1, -1e-6);

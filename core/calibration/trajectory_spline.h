@@ -1,6 +1,6 @@
 #pragma once
-// TrajectorySpline: pan and tilt over time, a CubicSpline whose control points are (pan, tilt; rad, TRUE angles, not
-// wrapped). Positions and rates are exact.
+// TrajectorySpline: pan and tilt over time as a CubicSpline. Its control points are (pan, tilt):
+// rad, true angles, not wrapped. Positions and rates are exact.
 
 #include "core/model/angle.h"
 #include "core/model/cubic_spline.h"

@@ -8,7 +8,7 @@
 namespace alidade::internal {
 namespace {
 
-// All rows but those of one node, of a curve with so many.
+// All rows except those of one node, for a curve of `nodes` nodes.
 std::vector<int> rows_but(int node, int nodes) {
   std::vector<int> rows;
   for (int i = 0; i < kZoomQuantityCount * nodes + kSharedCount; ++i) {
@@ -17,7 +17,7 @@ std::vector<int> rows_but(int node, int nodes) {
   return rows;
 }
 
-// information and weighted of a quantity: H with all other rows eliminated.
+// Sets information and weighted of a quantity: H with all other rows eliminated.
 bool set_information(int quantity, const Eigen::MatrixXd& H, const std::vector<int>& rows,
                      ZoomEvidence* evidence) {
   const int nodes = evidence->nodes();
@@ -95,7 +95,7 @@ bool take_apart(const ZoomCurve& curve, const ZoomCurveParts& parts, ZoomEvidenc
   if (evidence->H.size() == 0) return false;
   Eigen::VectorXd mean = Eigen::VectorXd::Zero(covariance.rows());
   mean.head(content.value.rows()) = content.value;
-  // The curves are about their levels: all of this is of the calibrations.
+  // The smoothness is about zero, so it adds nothing to g: all of g comes from the calibrations.
   evidence->g = evidence->H * mean;
   for (int q = 0; q < kZoomQuantityCount; ++q) {
     const auto& inverse = content.inverse[static_cast<std::size_t>(q)];
@@ -137,7 +137,7 @@ bool set_marginals(const std::vector<int>& places, double centre_sigma_px, ZoomE
   }
   const std::vector<int> rows = evidence->rows(places);
   for (int i = 0; i < evidence->nodes(); ++i) {
-    constexpr double kAnyLogF = 1;  // of what movements leave open, where another quantity is asked
+    constexpr double kAnyLogF = 1;  // log f between dwells, while another quantity is marginalised
     if (evidence->is_between[static_cast<std::size_t>(i)])
       H(evidence->row(i, 0), evidence->row(i, 0)) += 1 / (kAnyLogF * kAnyLogF);
   }

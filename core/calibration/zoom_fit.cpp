@@ -27,7 +27,8 @@ using internal::ZoomSolution;
 
 std::string reading_text(double reading) { return "reading " + short_text(reading); }
 
-// Beyond this sum of squares less its expectation, in its standard deviations, two cameras are mixed.
+// Rejects a mixture of two cameras: the chi-square exceeds its expectation by too many of its
+// standard deviations.
 bool belong_together(const ZoomFit& fit, const ZoomFitOptions& options, double worst_reading,
                      std::string* error) {
   const double expected = fit.degrees_of_freedom;
@@ -40,7 +41,8 @@ bool belong_together(const ZoomFit& fit, const ZoomFitOptions& options, double w
   return false;
 }
 
-// Where a lens comes back to, it comes back to about the same.
+// Two visits of one reading must agree in focal length, within six sigmas of lens repeatability and
+// calibrations.
 bool comes_back(double reading, const std::array<double, 2>& log_f,
                 const std::array<double, 2>& variance, double repeatability, std::string* error) {
   const double sigma = std::sqrt(2 * repeatability * repeatability + variance[0] + variance[1]);
@@ -51,7 +53,7 @@ bool comes_back(double reading, const std::array<double, 2>& log_f,
   return false;
 }
 
-// What calibrations of one camera have in common, whatever their zoom.
+// What every calibration needs: a zoom reading and the camera's image size.
 bool is_usable(const Calibration& c, const Camera<double>& camera, std::string* error) {
   if (!c.zoom || !std::isfinite(*c.zoom)) {
     *error = "a calibration has no zoom reading; one for each is needed";
@@ -62,7 +64,7 @@ bool is_usable(const Calibration& c, const Camera<double>& camera, std::string* 
   return false;
 }
 
-// How far a sample is from a curve in what they share. False: a covariance is not positive.
+// Chi-square of the shared parameters, sample against curve. False: a covariance is not positive.
 bool compare_shared(const ZoomSample& sample, const ZoomCurve::Content& curve,
                     const ZoomFitOptions& options, ZoomFit* fit) {
   Eigen::MatrixXd covariance = curve.covariance.bottomRightCorner<kSharedCount, kSharedCount>() +
@@ -91,7 +93,7 @@ bool make_sample(const Calibration& c, const Calibration& reference, const ZoomF
   return internal::set_zoom_information(free_places(covariance), options, reference, sample);
 }
 
-// Of a curve of these calibrations alone: nodes are in the order of readings, then as they are given.
+// Nodes of a curve made of these calibrations alone: ordered by reading, then by index.
 std::vector<int> nodes_by_calibration(const std::vector<Calibration>& calibrations) {
   std::vector<int> node_of(calibrations.size(), 0);
   for (std::size_t i = 0; i < calibrations.size(); ++i) {
@@ -224,7 +226,7 @@ bool fit_zoom(const std::vector<Calibration>& calibrations,
     readings.push_back(sample.reading);
   }
   ZoomEvidence evidence = internal::no_zoom_evidence(readings);
-  // Distortion and centre are about 0 from the start; the focal length may be any.
+  // The levels of distortion and centre are 0; that of log f is its mean.
   for (const ZoomSample& sample : samples) {
     evidence.level[0] += sample.value[0] / static_cast<double>(samples.size());
   }

@@ -1,16 +1,12 @@
 #pragma once
-// fit_zoom(): from the calibrations of one camera at some zoom readings to its ZoomCurve (core/model/zoom_curve.h).
-//   1 each calibration, less the priors that went into it, is a linear observation of its reading's focal length,
-//     distortion and optical centre, and of what all readings share
-//   2 the curves' roughness by their likelihood, q among a grid of factors about what is usual
-//   3 least squares over all, with the curves as prior: what one reading leaves open, as the axes against the optical
-//     centre at the long end, another decides
-// A calibration with a free optical centre counts fully; one that took it as exact makes all centres exact, as the axes of
-// the two cannot be compared otherwise.
-// Refused: readings of two cameras (shared parameters that differ beyond chance), a focal length that is not
-// monotone in the reading. Pure; allocates. Not for the real-time thread.
-// Movements of the zoom between the dwells add nodes of log f between them (movement_evidence.h).
-// extend_zoom(): one more calibration to a curve, which is taken apart for it: the same as if all had been fitted together.
+// fit_zoom(): from calibrations at some zoom readings to the ZoomCurve (core/model/zoom_curve.h).
+//   1 Each calibration, without its priors, is a linear observation of focal length, distortion and
+//     optical centre at its reading, and of the parameters that all readings share.
+//   2 The likelihood chooses the curves' roughness q from a grid of factors about the usual value.
+//   3 Least squares with the curves as prior: one reading determines what another leaves open, such
+//     as the axes against the optical centre at the long end. Movements of the zoom between the
+//     dwells add nodes of log f (movement_evidence.h).
+// Pure; allocates. Not for the real-time thread. Derivation: docs/calibration.md.
 
 #include <optional>
 #include <string>
@@ -22,69 +18,80 @@
 
 namespace alidade {
 
-// Of an image's width: how far an optical centre is off, usually.
+// Usual offset of an optical centre, as a share of the image's width.
 inline constexpr double kUsualCentreShare = 0.01;
-// As far as the clock offsets of two connections to one camera may differ.
+// s; how far the clock offsets of two connections to one camera may differ.
 inline constexpr double kAnyConnection_s = 0.1;
 
 struct ZoomFitOptions {
   double repeatability = 0.002;  // sigma of log f after a movement
-  // The reading may be older or newer than the angles that came with it, by the same in all of a camera's movements.
+  // The zoom reading may be older or newer than the angles that came with it, by the same time in
+  // all movements of a camera.
   double zoom_late_sigma_s = 0.01;
-  // Priors that went into each of the calibrations: counted once. 0: none. Axes' about the nominal ones. One that is sharper than a
-  // calibration knows the parameter did not go into that.
+  // Priors that went into each of the calibrations; they are counted once. 0: none. The axes' are
+  // about the nominal axes. A prior sharper than a calibration's own sigma did not go into that
+  // calibration.
   double centre_sigma_px = 0;
   double axis_sigma_rad = 0.05;
-  // Of shared parameters but the axes.
+  // Of shared parameters except the axes.
   struct Prior {
     Parameter parameter;
     double value;
     double sigma;
   };
   std::vector<Prior> shared_priors;
-  // In every clock offset alike, so that more calibrations do not average it out; stays in the curve's.
+  // Error of every clock offset alike. More calibrations do not average it out: it stays in the
+  // curve's clock offset.
   double common_clock_sigma_s = 0;
-  bool clock_is_another =
-      false;  // extend_zoom(): the curve's clock offset is of another connection
-  // So many standard deviations more than expected do calibrations of one camera differ in what they share.
+  // extend_zoom(): the curve's clock offset is of another connection.
+  bool clock_is_another = false;
+  // Limit of the chi-square's excess over its expectation, in standard deviations of the
+  // chi-square. Beyond it, the calibrations are of two cameras.
   double two_cameras = 8;
 };
 
-// With the priors of calibrations that were made so.
+// The options with the priors of calibrations made with these options.
 [[nodiscard]] ZoomFitOptions zoom_fit_options(const CalibrationOptions& made_with);
 
 struct ZoomFit {
   ZoomCurve curve;
-  double chi_square = 0;       // of the shared parameters' differences
-  int degrees_of_freedom = 0;  // of it
-  int node = 0;                // extend_zoom(): of the calibration
+  // Of all calibrations against the curve; with extend_zoom(): of the shared parameters'
+  // difference.
+  double chi_square = 0;
+  int degrees_of_freedom = 0;  // of chi_square
+  int node = 0;                // extend_zoom(): the node of the added calibration
 };
 
-// calibrations: at two or more readings, each with its zoom. False and one line in *error: what is wrong, and with which.
+// calibrations: at two or more readings, each with its zoom. All must take the same parameters as
+// exact: axes beside a free optical centre cannot be compared with axes beside an exact one. False
+// and one line in *error that names the calibration: readings of two cameras (shared parameters
+// differ beyond chance), or a focal length that is not monotone in the reading.
 [[nodiscard]] bool fit_zoom(const std::vector<Calibration>& calibrations,
                             const ZoomFitOptions& options, ZoomFit* fit, std::string* error);
 
-// Readings between those of the calibrations at which movements may be observed, in increasing order: as many as fit into a curve
-// with these calibrations, evenly between them.
+// Readings between those of the calibrations at which movements should be observed, in increasing
+// order. They divide the steps of log f, the widest first, until each is below 0.15 or the curve
+// has no room for more nodes.
 [[nodiscard]] std::vector<double> readings_between(const std::vector<Calibration>& calibrations);
 
-// The same with what movements say; their from and to are places in calibrations.
+// The same, with movements as well. Their from and to are indices into calibrations.
 [[nodiscard]] bool fit_zoom(const std::vector<Calibration>& calibrations,
                             const std::vector<MovementObservation>& movements,
                             const ZoomFitOptions& options, ZoomFit* fit, std::string* error);
 
-// What would help, one line each: between which readings the focal length is known to worse than `share` of it, as neither a dwell
-// nor a movement showed it.
+// Advice, one line each: between which readings the focal length is known to worse than `share` of
+// it, as neither a dwell nor a movement covered them.
 [[nodiscard]] std::vector<std::string> zoom_advice(const ZoomCurve& curve, double share = 0.01);
 
-// visit: the node that the calibration is another observation of, the zoom not moved since; none: a visit of its own, whose reading
-// may be that of another. Where there are kMaxNodes, one of those that are closest together is left out, what it said of the
-// others kept.
+// Adds one calibration to a curve; the result is the same as if all had been fitted together.
+// visit: the node that the calibration observes again, the zoom not moved since. Without visit it
+// gets a node of its own, possibly at the reading of another. A curve of kMaxNodes loses the inner
+// node whose neighbours are closest together; what it contributed to the others stays.
 [[nodiscard]] bool extend_zoom(const ZoomCurve& curve, const Calibration& added,
                                std::optional<int> visit, const ZoomFitOptions& options,
                                ZoomFit* fit, std::string* error);
 
-// Content::inverse from the rest. False if two nodes are too close for it.
+// Computes Content::inverse from the other members. False if two nodes are too close for it.
 [[nodiscard]] bool set_inverses(ZoomCurve::Content* content);
 
 }  // namespace alidade

@@ -20,14 +20,15 @@ using internal::MovementData;
 using internal::RecordingClocks;
 using internal::SelectedInput;
 
-// Of each rest, so far from the movement, so much is looked at: image and telemetry need not be of one clock to that.
+// A movement is taken to begin and end kGuard_s beyond its readings, as image and telemetry clocks
+// agree only to that. Of each dwell, another kRest_s are used.
 constexpr double kGuard_s = 0.15;
 constexpr double kRest_s = 0.8;
 constexpr int kLeastLandmarks = 20;
-constexpr double kLoose = 0.05;         // sigma of log f from which on nothing was followed
-constexpr double kWorstPixelRatio = 4;  // residuals over the stated noise
+constexpr double kLoose = 0.05;         // sigma of log f; beyond it no landmark was followed there
+constexpr double kWorstPixelRatio = 4;  // residuals / stated noise
 
-// The readings of the movement, at the image clock's times.
+// The movement's zoom readings at times of the image clock.
 std::vector<ZoomReading> readings_by_image(const ZoomMovement& movement,
                                            const SelectedInput& selected, double clock_offset) {
   std::vector<ZoomReading> readings;
@@ -48,7 +49,7 @@ std::vector<ZoomReading> readings_by_image(const ZoomMovement& movement,
   return readings;
 }
 
-// The moving ones, with the last of the first rest and the first of the second.
+// The readings during the movement, with the last of the first dwell and the first of the second.
 bool passed_readings(const ZoomMovement& movement, const std::vector<ZoomReading>& all,
                      std::vector<ZoomReading>* passed, std::string* error) {
   const double sign = movement.to.zoom > movement.from.zoom ? 1 : -1;
@@ -66,7 +67,7 @@ bool passed_readings(const ZoomMovement& movement, const std::vector<ZoomReading
   return false;
 }
 
-// Smallest difference of two readings that differ.
+// Smallest step between consecutive readings that differ; 0 if none do.
 double step_of(const std::vector<ZoomReading>& readings) {
   double step = std::numeric_limits<double>::infinity();
   for (std::size_t i = 1; i < readings.size(); ++i) {
@@ -81,7 +82,7 @@ double log_f_of(const ZoomCurve& curve, double reading) {
   return curve.at(reading, &c) ? std::log(c.camera.focal_length) : 0;
 }
 
-// Tracks of frames from begin to end on the image clock.
+// Keeps the observations of frames from begin to end (image clock).
 void keep_between(double begin_s, double end_s, SelectedInput* selected) {
   auto& observations = selected->data.observations;
   const auto outside = [&](const internal::AdjustmentObservation& seen) {
@@ -90,7 +91,7 @@ void keep_between(double begin_s, double end_s, SelectedInput* selected) {
   };
   observations.erase(std::remove_if(observations.begin(), observations.end(), outside),
                      observations.end());
-  // Landmarks that are left with two or more, numbered anew.
+  // Keeps landmarks with two observations or more, and renumbers them.
   std::vector<internal::AdjustmentObservation> kept;
   int count = 0;
   for (std::size_t i = 0; i < observations.size();) {
@@ -109,7 +110,8 @@ void keep_between(double begin_s, double end_s, SelectedInput* selected) {
   observations = std::move(kept);
 }
 
-// log f where a reading was passed: the curve's, and between the two samples about it what the spline has beside the curve.
+// log f where a reading was passed: the curve's, plus the spline's deviation from the curve,
+// interpolated between the two samples around it.
 struct Crossing {
   double reading = 0;
   Eigen::VectorXd row;  // of the adjustment's unknowns
@@ -241,7 +243,7 @@ bool observe_movement(const ZoomMovement& movement, const ZoomCurve& curve,
     const auto at = static_cast<Eigen::Index>(2 + i);
     observation->covariance(at, at) += crossings[i].variance;
   }
-  // Where the lines through the stamps lie is drawn anew for each movement.
+  // The offsets of the lines through the stamps err anew in each movement.
   const Eigen::VectorXd& rate = observation->rate_per_s;
   observation->covariance +=
       (std::pow(clocks.image.offset_sigma_s, 2) + std::pow(clocks.telemetry.offset_sigma_s, 2)) *
@@ -271,7 +273,7 @@ std::vector<ZoomMovement> find_movements(const CalibrationInput& input,
     const auto is_within = [&](double time, double margin) {
       return time >= from.begin_s - margin && time <= to.end_s + margin;
     };
-    // Image and telemetry are not of one clock: a second more of the first does no harm.
+    // Image and telemetry clocks differ. A second more of the images does no harm.
     constexpr double kAround_s = 1;
     for (const CalibrationFrame& frame : input.frames) {
       if (!is_within(frame.stamp_s, 0)) continue;

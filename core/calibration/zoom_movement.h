@@ -1,12 +1,11 @@
 #pragma once
-// observe_movement(): what keypoint tracks say of the focal length while the zoom moves from one rest to the next.
-//   pan, tilt and log f are cubic B-splines of time, log f constant at either rest; the landmarks' directions are free
-//   residuals   u - pi(R(pan, tilt)^T d), rows exposed one after another, f changing with them; telemetry's pan and tilt
-//   open too    corner distortion and optical centre between the rests, about what the curve has, by its sigmas
-//   held        line delay, axes, scales and clock offset, which the rests told
-// The scale of landmarks that are followed through the movement ties all to both rests. Result: log f at both rests and
-// at zoom readings that were passed, with their covariance; the readings are those of the telemetry, so f and reading are of the
-// same moment as far as the clock offset and what is told of the zoom are. Pure; allocates; tenths of a second.
+// observe_movement(): what landmark tracks show of the focal length while the zoom moves from one
+// dwell to the next. The adjustment is that of movement_adjustment.h.
+// The scale of landmarks that are followed through the movement ties all its frames to both dwells.
+// Results are log f at both dwells and at zoom readings that were passed, with their covariance.
+// The zoom readings are the telemetry's. So f and reading belong to the same moment, up to the
+// errors of the clock offset and of the reading's time.
+// Pure; allocates; takes tenths of a second.
 
 #include <Eigen/Core>
 #include <optional>
@@ -20,24 +19,26 @@
 namespace alidade {
 
 struct ZoomMovement {
-  // Frames and telemetry of both rests and of what is between, tracks at least of the latter.
+  // Frames and telemetry of both dwells and of the movement between them; tracks at least of the
+  // movement.
   CalibrationInput input;
   StampNoise image_stamps = StampNoise::kSymmetric;  // as in CalibrationOptions
   StampNoise telemetry_stamps = StampNoise::kSymmetric;
-  std::vector<ZoomReading> readings;  // stamps as the telemetry's
-  ZoomStretch from;                   // the rests
-  ZoomStretch to;
+  std::vector<ZoomReading> readings;  // with the telemetry's stamps
+  ZoomStretch from;                   // the dwells before
+  ZoomStretch to;                     // and after it
 };
 
-// Observed are log f at the first rest, at the second and at each of the readings.
+// log_focal_length, covariance and rate_per_s are for the first dwell, the second, then each
+// reading.
 struct MovementObservation {
-  // Which of the calibrations of fit_zoom() each rest is; nothing: none of them.
+  // Index of each dwell's calibration in fit_zoom(); nothing: it is none of them.
   std::optional<std::size_t> from;
   std::optional<std::size_t> to;
   std::vector<double> reading;
   Eigen::VectorXd log_focal_length;
   Eigen::MatrixXd covariance;
-  Eigen::VectorXd rate_per_s;  // of log f: what a time that is off does to it
+  Eigen::VectorXd rate_per_s;  // d log f / dt: the effect of a time error
   double pixel_sigma_ratio = 0;
   int frames = 0;
   int landmarks = 0;
@@ -46,13 +47,14 @@ struct MovementObservation {
 // Movements longer than this are left out.
 inline constexpr double kLongestMovement_s = 20;
 
-// curve: of the rests, at least. readings: of which those that were passed while landmarks were followed are observed. from and to are left to the caller. False
-// and one line in *error: why nothing can be said.
+// curve: covers at least the dwells. readings: those that were passed while landmarks were followed
+// are observed. The caller sets from and to of the observation. False and one line in *error: why
+// nothing can be observed.
 [[nodiscard]] bool observe_movement(const ZoomMovement& movement, const ZoomCurve& curve,
                                     const std::vector<double>& readings,
                                     MovementObservation* observation, std::string* error);
 
-// The movements between rests that are neighbours in time; input: of a whole recording.
+// The movements between consecutive dwells. input: of a whole recording.
 [[nodiscard]] std::vector<ZoomMovement> find_movements(const CalibrationInput& input,
                                                        const std::vector<ZoomReading>& readings,
                                                        const std::vector<ZoomStretch>& rests);

@@ -10,7 +10,7 @@
 namespace alidade::internal {
 namespace {
 
-// Where a parameter of a calibration stands in a sample.
+// The calibration parameter at an index of a sample.
 Parameter zoom_parameter_at(int i) {
   constexpr std::array<Parameter, kZoomQuantityCount> kLens = {
       Parameter::kFocalLength, Parameter::kRadialDistortion, Parameter::kCentreU,

@@ -18,7 +18,7 @@ constexpr const char* kUndetermined =
     "the calibrations leave what their readings share undetermined";
 constexpr int kFirstCentre = static_cast<int>(ZoomQuantity::kCentreU);  // and the one after it
 
-// Of the nodes' values, a movement's error at each visit included.
+// Prior covariance of the nodes' values. It includes the lens's repeatability at each visit.
 Eigen::MatrixXd process_covariance(const ZoomCurve::Content& content, int quantity) {
   const ZoomSmoothness& smoothness = content.smoothness[static_cast<std::size_t>(quantity)];
   const double first = content.reading[0];
@@ -26,7 +26,8 @@ Eigen::MatrixXd process_covariance(const ZoomCurve::Content& content, int quanti
   const auto position = [&](int node) {
     return (content.reading[static_cast<std::size_t>(node)] - first) / (last - first);
   };
-  // Two visits of one reading are not quite one, or no rounding would tell them apart: to hundredths of a pixel.
+  // Two visits of one reading get a tiny variance between them, else rounding makes K singular. It
+  // is hundredths of a pixel.
   const double apart = quantity == 0 ? 1e-5 : 1e-4;
   Eigen::MatrixXd K(content.nodes, content.nodes);
   for (int i = 0; i < content.nodes; ++i) {
@@ -39,7 +40,8 @@ Eigen::MatrixXd process_covariance(const ZoomCurve::Content& content, int quanti
   return K;
 }
 
-// Of log f from the first node to the last: by least squares with curves that may be of any shape.
+// Rise of log f from the first dwell to the last, by least squares with a loose prior on the
+// curve's shape.
 double rise_of(const ZoomEvidence& evidence) {
   constexpr double kAny = 10;  // sigma of log f less its level
   Eigen::MatrixXd information = evidence.information[0];
@@ -52,8 +54,9 @@ double rise_of(const ZoomEvidence& evidence) {
   return log_f[last] - log_f[first];
 }
 
-// What is usual of lenses: a focal length whose logarithm bends by as much as it rises, a distortion of some parts in a
-// hundred at the corner, a centre within a hundredth of the image that wanders by half of that.
+// Usual lenses: the logarithm of the focal length bends by as much as it rises, the distortion at
+// the corner is some hundredths, and the centre is within a hundredth of the image and wanders by
+// half of that.
 std::array<ZoomSmoothness, kZoomQuantityCount> usual(double rise, const Camera<double>& camera) {
   const double centre_px = kUsualCentreShare * camera.width;
   return {ZoomSmoothness{5, 20, 1.5 * std::max(std::abs(rise), 0.1)}, ZoomSmoothness{0.3, 0.3, 0.1},
@@ -61,8 +64,9 @@ std::array<ZoomSmoothness, kZoomQuantityCount> usual(double rise, const Camera<d
           ZoomSmoothness{centre_px, centre_px, 0.5 * centre_px}};
 }
 
-// Of a quantity at the nodes, of which some may not be told at all: with K the process's covariance, A what is known,
-//   -(log |K| + log |K^-1 + A| - b^T (K^-1 + A)^-1 b) / 2,  b = A times the mean
+// Log likelihood of a quantity's roughness. It also holds if A leaves a node undetermined. With K
+// the process's covariance, A the marginal information and b = A times the mean:
+//   -(log |K| + log |K^-1 + A| - b^T (K^-1 + A)^-1 b) / 2
 std::optional<double> curve_likelihood(const ZoomCurve::Content& content, int quantity,
                                        const ZoomEvidence& evidence) {
   const auto of = static_cast<std::size_t>(quantity);
@@ -159,9 +163,10 @@ bool ZoomSolution::curve(ZoomCurve* curve, std::string* error) const {
   return is_monotone(*curve, error);
 }
 
-// Likelihood of each quantity by itself, the others taken as open. Log f and distortion are told so well by their nodes that the
-// best roughness will do. Centres are not: the best of what a few uncertain nodes leave possible is often too smooth, and draws
-// them off by more than it says. The mean over what is possible is rougher.
+// The likelihood of each quantity by itself, with the others free. The nodes determine log f and
+// distortion so well that the most likely roughness will do. Centres are known less well: the most
+// likely roughness is often too smooth, and pulls them off by more than their sigmas. Their
+// likelihood-weighted mean roughness is larger.
 void ZoomSolution::choose_roughness() {
   constexpr int kSteps = 33;
   constexpr double kDecades = 2;          // on either side
@@ -204,7 +209,7 @@ bool ZoomSolution::solve() {
       for (int j = 0; j < nodes_; ++j) H(evidence_.row(i, q), evidence_.row(j, q)) += inverse(i, j);
     }
   }
-  // What all calibrations take as exact is exact.
+  // Parameters that all calibrations take as exact stay exact.
   const Eigen::MatrixXd covariance = inverse_over(H, evidence_.rows(places_));
   if (covariance.size() == 0) return false;
   content_.covariance = covariance;

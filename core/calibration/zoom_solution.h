@@ -1,6 +1,7 @@
 #pragma once
-// ZoomSolution: least squares over all that calibrations say of a zoom's nodes, with the curves as prior: their roughness by its
-// likelihood, then nodes, shared parameters and covariance. Steps 2 and 3 of zoom_fit.h. Allocates.
+// ZoomSolution: least squares over everything that calibrations say about a zoom's nodes, with the
+// curves as prior (steps 2 and 3 of zoom_fit.h). It chooses the roughness by likelihood, then
+// solves for nodes, shared parameters and their covariance. Allocates.
 
 #include <Eigen/Core>
 #include <string>
@@ -13,14 +14,15 @@ namespace alidade::internal {
 
 class ZoomSolution {
  public:
-  // places: of a sample that are not exact. reference: what the shared parameters are changes from; must outlive it, as the options.
+  // places: sample indices that are not exact. reference: the shared parameters are changes from
+  // it. reference and options must outlive this object.
   ZoomSolution(ZoomEvidence evidence, std::vector<int> places, const Calibration& reference,
                const ZoomFitOptions& options);
 
-  // False and one line in *error: something is left undetermined.
+  // False and one line in *error: something is undetermined.
   [[nodiscard]] bool run(std::string* error);
 
-  // After run(): a sample less what all say together.
+  // After run(): the residual of a sample against the solution.
   [[nodiscard]] ZoomSampleVector left_of(const ZoomSample& sample, int node) const;
   [[nodiscard]] int shared_places() const;
   // False and one line in *error: the focal length is not monotone.

@@ -23,7 +23,7 @@ std::vector<ZoomStretch> find_zoom_stretches(const std::vector<ZoomReading>& rea
       stretches.back().end_s = reading.time_s;
       continue;
     }
-    // Back where it was before a glitch: those in between are taken out.
+    // Back at the reading before a glitch: removes the dwells between.
     std::size_t before = stretches.size();
     while (before > 0 && stretches[before - 1].end_s > reading.time_s - options.glitch_s &&
            !is_one(stretches[before - 1], reading.zoom, options)) {

@@ -1,6 +1,6 @@
 #pragma once
-// find_zoom_stretches(): the parts of a recording in which the zoom reading stands still. A reading that is away for less than a
-// movement can take is a glitch and ends no stretch. Pure; allocates.
+// find_zoom_stretches(): the dwells of a recording, during which the zoom reading is constant. A
+// change that is shorter than a movement is a glitch and ends no dwell. Pure; allocates.
 
 #include <vector>
 
@@ -8,22 +8,22 @@ namespace alidade {
 
 struct ZoomReading {
   double time_s = 0;
-  double zoom = 0;  // device units; one that is not finite is left out
+  double zoom = 0;  // device units; skipped if not finite
 };
 
 struct ZoomStretch {
   double zoom = 0;     // the first reading
-  double begin_s = 0;  // of its first and last reading
-  double end_s = 0;
+  double begin_s = 0;  // of the first reading
+  double end_s = 0;    // of the last reading
 };
 
 struct ZoomStretchOptions {
-  double tolerance = 0;   // device units within which two readings are one
-  double glitch_s = 0.2;  // shorter than this is no movement
-  double least_s = 0;     // shorter stretches are left out
+  double tolerance = 0;   // device units; readings this close are equal
+  double glitch_s = 0.2;  // a shorter change is no movement
+  double least_s = 0;     // shorter dwells are left out
 };
 
-// readings: by time.
+// readings: in order of time.
 [[nodiscard]] std::vector<ZoomStretch> find_zoom_stretches(const std::vector<ZoomReading>& readings,
                                                            const ZoomStretchOptions& options = {});
 

@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::array<const char*, kZoomQuantityCount> kQuantityNames = {
     "log_focal_length", "corner_distortion", "centre_u", "centre_v"};
-// Beyond these a value is in another unit.
+// A value beyond these is in another unit.
 constexpr std::array<double, kZoomQuantityCount> kLargest = {20, 10, 1e4, 1e4};
 constexpr double kLargestSigma = 1e4;
 

@@ -1,5 +1,5 @@
 #pragma once
-// Two boxes of what has changed, and what lies between them.
+// Two boxes of changes, and what lies between them.
 
 #include <algorithm>
 #include <cmath>
@@ -12,7 +12,7 @@ namespace alidade::internal {
   return std::max(box.width, box.height);
 }
 
-// The larger of that across and that down, px; negative where they overlap.
+// px; the larger of the gaps across and down; negative if they overlap.
 [[nodiscard]] inline double gap_between(const DetectionBox& a, const DetectionBox& b) {
   const double across = std::max(a.u, b.u) - std::min(a.u + a.width, b.u + b.width);
   const double down = std::max(a.v, b.v) - std::min(a.v + a.height, b.v + b.height);
@@ -24,7 +24,8 @@ namespace alidade::internal {
          at.y() <= box.v + box.height;
 }
 
-// act(u, v) for the pixels on the line between the boxes' middles that are in neither, a pixel's width apart.
+// act(u, v) for the pixels on the line between the boxes' middles that are in neither, about a
+// pixel apart.
 template <typename Act>
 void each_between(const DetectionBox& a, const DetectionBox& b, Act&& act) {
   const Vector2<double> from = a.middle();

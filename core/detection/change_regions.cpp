@@ -9,7 +9,7 @@
 namespace alidade {
 namespace {
 
-constexpr int kHalf = 2;  // of the 5x5 pixels that are summed
+constexpr int kHalf = 2;  // half the side of the 5x5 pixels
 constexpr int kHeldZ = kMostChangeZ * ChangeRegions::kUnit;
 constexpr double kLeastEdge = 2.5;  // sigmas
 constexpr double kMergeShare = 0.75;
@@ -97,7 +97,7 @@ bool ChangeRegions::find_runs(int v) {
   return true;
 }
 
-// Those of one row with those of the row before it that they touch, corners included.
+// Joins runs of a row with those of the row above that they touch, corners included.
 void ChangeRegions::join(std::size_t above, std::size_t above_end, std::size_t here) {
   while (above < above_end && here < runs_.size()) {
     const Run& a = runs_[above];

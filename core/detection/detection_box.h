@@ -1,7 +1,7 @@
 #pragma once
-// What a detector, of this folder or from outside, says of one thing in the picture: the smallest upright rectangle around it, and how sure it is.
-// Pixels as everywhere (CONVENTIONS.md): the box spans [u, u + width] x [v, v + height], and one that holds the top-left pixel alone
-// is (0, 0, 1, 1).
+// DetectionBox: a detection in a picture, by this folder or from outside: its smallest upright
+// rectangle and score. Pixels as in CONVENTIONS.md: the box spans [u, u + width] x [v, v + height].
+// One around the top-left pixel alone is (0, 0, 1, 1).
 
 #include <string>
 
@@ -14,14 +14,14 @@ struct DetectionBox {
   double v = 0;       // px, upper edge
   double width = 0;   // px
   double height = 0;  // px
-  double score = 1;   // the larger the surer; its scale is the detector's, from outside 0 to 1
-  std::string name;   // its class; empty: not told
+  double score = 1;   // larger is surer; the detector's scale, from outside 0 to 1
+  std::string name;   // class; empty: unknown
 
   [[nodiscard]] Vector2<double> foot() const { return {u + width / 2, v + height}; }
   [[nodiscard]] Vector2<double> middle() const { return {u + width / 2, v + height / 2}; }
 };
 
-// Area in common over area together, 0 to 1.
+// Common area over joint area, 0 to 1.
 [[nodiscard]] double overlap(const DetectionBox& a, const DetectionBox& b);
 
 }  // namespace alidade

@@ -1,9 +1,11 @@
 #pragma once
-// Pictures of the last seconds with their orientations, in fixed memory: what a picture is compared with.
-// The latest kRecent frames are all kept, since they show what has only just come into view; of those that leave, one in every spacing_s goes on
-// to a ladder of kLadder, so that it reaches back to kLadder * spacing_s. Preferred are the ladder's, the newest first, and then the
-// recent ones, the oldest first: what moves slowly has left its place in them. A ladder's frame that is not spacing_s old yet comes among these.
-// All memory is taken by the constructor. For one thread.
+// EarlierFrames: pictures of the last seconds with their orientations, to compare a picture with.
+// The latest kRecent frames are all kept, as they show what has only just come into view. Of the
+// frames that leave them, one in every spacing_s goes on to a ladder of kLadder, which reaches back
+// kLadder * spacing_s.
+// Order of preference: the ladder, newest first, then the recent ones, oldest first, as slow
+// targets have left their place there. A ladder frame younger than spacing_s comes just before the
+// recent ones. The constructor takes all memory. For one thread.
 
 #include <array>
 #include <cstdint>
@@ -21,7 +23,7 @@ class EarlierFrames {
   static constexpr int kMost = kRecent + kLadder;
 
   struct Frame {
-    std::vector<std::uint8_t> pixels;  // row after row
+    std::vector<std::uint8_t> pixels;  // row by row
     FrameOrientation orientation;
   };
 
@@ -32,12 +34,12 @@ class EarlierFrames {
   void add(const ImageView& image, const FrameOrientation& orientation);
 
   [[nodiscard]] int size() const { return recent_.count + ladder_.count; }
-  // In the order of preference to a picture of that time; call before preferred() and view().
+  // Sets the order of preference for a picture of that time. Call it before preferred() and view().
   void order_for(double time_s);
   [[nodiscard]] const Frame& preferred(int i) const {
     return frames_[static_cast<std::size_t>(order_[static_cast<std::size_t>(i)])];
   }
-  // In that order, the oldest of the recent ones.
+  // Index of the oldest recent frame in that order.
   [[nodiscard]] int first_recent() const { return ladder_.count; }
   [[nodiscard]] ImageView view(int i) const {
     return {preferred(i).pixels.data(), width_, height_, width_};
@@ -49,7 +51,7 @@ class EarlierFrames {
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
-  // Of frames_, the newest first.
+  // Indices of frames_, newest first.
   struct Row {
     std::array<int, kMost> slots{};
     int count = 0;
@@ -66,7 +68,7 @@ class EarlierFrames {
   double spacing_s_;
   std::array<Frame, kMost> frames_;
   Row recent_, ladder_, free_;
-  std::array<int, kMost> order_{};  // of frames_
+  std::array<int, kMost> order_{};  // indices of frames_
 };
 
 }  // namespace alidade

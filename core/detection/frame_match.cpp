@@ -11,15 +11,15 @@ namespace {
 using Vector7 = Matrix<double, 7, 1>;
 
 constexpr int kMatchSteps = 4;
-constexpr double kStill_px = 0.01;  // of a step, after which no other is made
+constexpr double kStill_px = 0.01;  // of the last step
 constexpr double kHuberSigmas = 2;
-// Where texture says less of the shift than this, it stays 0, px.
+// Sigma of the prior, which holds the shift at 0 where texture shows less of it.
 constexpr double kShiftPrior_px = 2;
 constexpr double kShearPrior_px = 1;
 constexpr double kGainPrior = 0.3;
 constexpr double kOffsetPrior = 30;  // grey levels
 constexpr double kFalloffPrior = 0.3;
-constexpr double kMostFalloff = 0.8;  // corners stay lit
+constexpr double kMostFalloff = 0.8;  // keeps the corners lit
 constexpr double kNormalQuartile = 0.6745;
 
 }  // namespace
@@ -59,7 +59,8 @@ FrameMatch match_frames(const SmoothedView& now, const ImageView& then, const Ti
     Matrix<double, 7, 7> normal = prior.asDiagonal();
     Vector7 right = -prior.cwiseProduct(off);
     std::size_t count = 0;
-    // Another pixel of each tile in each row of tiles, so that no pattern is seen at one phase only.
+    // Another pixel of each tile in each row of tiles, so that no pattern is sampled at a single
+    // phase.
     for (int j = 0; j < rows; ++j) {
       const TileCorner* upper = warp.data() + static_cast<std::ptrdiff_t>(j) * (columns + 1);
       const TileCorner* lower = upper + columns + 1;

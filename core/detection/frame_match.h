@@ -1,12 +1,12 @@
 #pragma once
-// What is left between a picture and the same scene predicted from an earlier one, after their orientations have had their say: a
-// small shift, the light.
+// match_frames(): small shift and light change that remain between a picture and its prediction
+// from an earlier one by their orientations. Robust least squares over one pixel in 256:
 //   now(u) = gain V(u) / V(w) then(w) + offset,   w = warp(u) + shift + shear r
-//   r = 2 u_v / height - 1: from -1 in the first row to 1 in the last;   V(u) = 1 + falloff |u - middle|^2 / (half diagonal)^2
-// by robust least squares over one pixel in 256, weighted by what noise and a misalignment of the stated size leave to expect.
-// Errors of orientation (shift) and of its rates (shear) that two frames do not share come out here, up to a pixel or two where the scene has
-// texture; in flat directions they stay 0. V: a lens is darker towards its corners, and the scene moves through that as the camera
-// turns. Things that move are outliers. No allocation.
+//   r = 2 u_v / height - 1: -1 in the first row, 1 in the last
+//   V(u) = 1 + falloff |u - middle|^2 / (half diagonal)^2
+// Shift and shear: errors of orientation and rates that the frames do not share, up to a pixel or
+// two where there is texture; 0 in flat directions. V: lenses are darker at the corners, through
+// which the scene moves while the camera turns. Moving things are outliers. No allocation.
 
 #include <algorithm>
 #include <cstdint>
@@ -18,7 +18,7 @@
 
 namespace alidade {
 
-// The picture of now, smoothed (spline_image.h).
+// The current picture, smoothed (spline_image.h).
 struct SmoothedView {
   const std::uint16_t* pixels = nullptr;
   int width = 0;
@@ -29,14 +29,14 @@ struct SmoothedView {
   }
 };
 
-// What a difference of two smoothed pictures may be without anything having moved, one standard deviation in grey levels squared:
+// Variance (grey levels^2) of the difference of two smoothed pictures of a scene without motion:
 //   noise^2 + (shift |gradient|)^2 + (blur |second derivative|)^2
 struct DifferenceModel {
   float noise_square = 1;  // grey levels^2
   float shift_square = 0;  // px^2
   float blur_square = 0;   // px^4
 
-  // At pixel u of three rows of a smoothed picture.
+  // At pixel u, from three rows of a smoothed picture.
   [[nodiscard]] float variance(const std::uint16_t* above, const std::uint16_t* here,
                                const std::uint16_t* below, int u) const {
     constexpr float kUnitSquare = 1.0F / (36 * 36);
@@ -54,13 +54,13 @@ struct FrameMatch {
   Vector2<double> shear = Vector2<double>::Zero();  // px
   double gain = 1;
   double offset = 0;   // grey levels
-  double falloff = 0;  // of the light in the corners, as share of the middle's; negative: darker
-  double spread = 0;   // of what remains, robust, over what the model expects; 1: as expected
+  double falloff = 0;  // of the light at the corners, as a share of the middle's; negative: darker
+  double spread = 0;   // of the residuals, robust, over the model's; 1: as expected
   int samples = 0;
 
   // r: of the row.
   [[nodiscard]] Vector2<double> shift_at(double r) const { return shift + r * shear; }
-  // V(u) / V(w), of squares of distances from the middle over that of the corners.
+  // V(u) / V(w) from squared distances from the middle, over those of the corners.
   [[nodiscard]] double vignetting(double now_square, double then_square) const {
     return (1 + falloff * now_square) / (1 + falloff * then_square);
   }
@@ -69,10 +69,10 @@ struct FrameMatch {
   }
 };
 
-// Of the middle of a pixel's row.
+// r of the middle of a row of pixels.
 [[nodiscard]] inline double row_place(int v, int height) { return (2.0 * v + 1) / height - 1; }
 
-// Squares of distances from a picture's middle, over that of its corners.
+// Squared distance from a picture's middle, over that of its corners.
 class CornerDistance {
  public:
   CornerDistance(int width, int height)
@@ -95,7 +95,7 @@ class CornerDistance {
                                       const TileCorners& warp, int columns, int rows,
                                       const DifferenceModel& model, std::vector<float>* scratch);
 
-// How much of a tile has its pixels in the earlier picture, after a shift.
+// How much of a tile the earlier picture shows, after a shift.
 enum class TileSight { kNone, kPart, kAll };
 
 [[nodiscard]] TileSight tile_sight(const TileCorner* upper, const TileCorner* lower,

@@ -1,9 +1,10 @@
 #pragma once
-// Where the pixels of one frame are in an earlier one, by both frames' orientations and lenses, each pixel at its own row's time:
-//   u_then = pixel_then(direction_now(u_now)),   FrameOrientation of each
-// Exact at nodes some 128 px apart, cubic between them, at the corners of tiles of kTile x kTile pixels; linear in a tile. Where a lens
-// distorts by 7 % in the corner and frames are half a picture apart that is within 0.04 px of exact (comparison_test).
-// A frame of which a node has no pixel is refused as a whole. All memory is taken by the constructor. For one thread.
+// FrameWarp: where pixels of one frame are in an earlier one, by both frames' orientations and
+// lenses, each pixel at its own row's time: u_then = pixel_then(direction_now(u_now)).
+// Exact at nodes some 128 px apart, cubic between them at the corners of tiles of kTile x kTile
+// pixels, linear within a tile. With 7 % distortion in the corner and frames half a picture apart
+// the error is below 0.04 px (comparison_test). A frame with a node that has no pixel is refused as
+// a whole. The constructor takes all memory. For one thread.
 
 #include <vector>
 
@@ -17,12 +18,12 @@ struct TileCorner {
   float u, v;  // px, in the earlier frame
 };
 
-// Corners of tiles, row after row: that of column i and row j is of pixel (16 i, 16 j).
+// Corners of tiles, row by row: that of column i and row j is the point (16 i, 16 j) px.
 using TileCorners = std::vector<TileCorner>;
 
 class FrameWarp {
  public:
-  // Of pictures of that size, both at least kTile.
+  // width, height: of the pictures; at least kTile.
   FrameWarp(int width, int height);
 
   [[nodiscard]] int columns() const { return columns_; }  // of tiles; the last may reach beyond
@@ -31,13 +32,14 @@ class FrameWarp {
     return static_cast<std::size_t>(columns_ + 1) * static_cast<std::size_t>(rows_ + 1);
   }
 
-  // The frame whose pixels are asked for. False: a pixel has no direction.
+  // Sets the current frame. False: a pixel has no direction.
   [[nodiscard]] bool look(const FrameOrientation& now);
-  // out: of corners() elements.
+  // Where its pixels are in an earlier frame. out: corners() elements. False: a node has no pixel
+  // there.
   [[nodiscard]] bool to(const FrameOrientation& then, TileCorners* out);
 
  private:
-  // Cubic through four nodes, the first of them named.
+  // Cubic through four nodes from `first` on.
   struct Stencil {
     int first;
     float weight[4];

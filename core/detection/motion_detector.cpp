@@ -11,17 +11,18 @@
 namespace alidade {
 namespace {
 
-// Variance of white noise seen through the B-spline, at pixel centres and, on average, between them.
+// Variance of white noise smoothed by the B-spline, at pixel centres and, on average, between them.
 constexpr double kSplineNoiseHere = 0.25;
 constexpr double kSplineNoiseBetween = 0.23;
 constexpr double kSplineNoise = kSplineNoiseHere + kSplineNoiseBetween;
-// The least that samples of a match must be.
+// Least samples of a match.
 constexpr int kLeastSamples = 50;
 constexpr double kLeastGain = 0.5;
-// z, in its units: the least of a row in a tile for which further pictures are asked. A region needs 2.3 sigmas on average.
+// Least |z| (in its units) of a row in a tile for which further pictures are compared. A region
+// needs 2.3 sigmas on average.
 constexpr float kLeastAsked = 2.5F * ChangeRegions::kUnit;
 constexpr float kMostZ = 2000;
-// S, sigmas, of a box against the recent picture; and how far about a box is looked.
+// Least |S| (sigmas) of a box against the recent picture, and the margin around a box.
 constexpr double kLeastRecent = 4;
 constexpr int kAboutBox_px = 2;
 
@@ -78,7 +79,7 @@ MotionDetector::MotionDetector(const MotionOptions& options)
       noise_(RunningNoiseOptions{}),
       regions_(options.width, options.height, options.change) {
   boxes_.reserve(static_cast<std::size_t>(options.change.most_boxes));
-  // A tile at the right may reach beyond its row.
+  // A tile at the right may extend beyond its row.
   smooth_pixels_ =
       static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
   smooth_.resize(smooth_pixels_ + kTile + 1);
@@ -119,7 +120,7 @@ MotionStatus MotionDetector::check(const ImageView& image,
   return MotionStatus::kOk;
 }
 
-// In the picture's middle, along its motion.
+// px, in the picture's middle, along its motion.
 double MotionDetector::blur_px(const FrameOrientation& orientation) const {
   return orientation.angular_velocity.head<2>().norm() *
          orientation.calibration.camera.focal_length * options_.exposure_s;
@@ -138,7 +139,8 @@ void MotionDetector::warp_earlier(const FrameOrientation& orientation) {
   }
 }
 
-// For each tile those that have all of it, then those that have a part. The share of the picture that has enough of them.
+// Chooses for each tile the frames that show all of it, then those that show a part. Returns the
+// share of the picture that has enough of them.
 double MotionDetector::choose_tiles() {
   for (Compared& compared : compared_) compared.chosen = false;
   const int columns = warp_.columns();
@@ -177,7 +179,8 @@ double MotionDetector::choose_tiles() {
   return static_cast<double>(covered) / static_cast<double>(tiles_.size());
 }
 
-// Those that are chosen and were not matched. False: one is not to be used, so tiles have to choose anew.
+// Matches the chosen frames that are not matched yet. False: one of them cannot be used, so tiles
+// must choose again.
 bool MotionDetector::match_chosen(const FrameOrientation& orientation, MotionAnswer* answer) {
   const double noise = noise_.sigma();
   const double blur = blur_px(orientation);
@@ -229,7 +232,7 @@ void MotionDetector::compare_row(int which, int column, int row, int v, TileRow*
   const float most_v = static_cast<float>(options_.height) - kSplineMargin;
   TileRow seen;
   TileRow square;  // of the distance from the earlier picture's middle
-  TileRow there;   // 1, or 0 where it is not in the earlier picture
+  TileRow there;   // 1; 0 if it is not in the earlier picture
   for (int i = 0; i < kTile; ++i) {
     const float s = static_cast<float>(i) + 0.5F;
     const float u = from.u + s * step.u;
@@ -250,7 +253,7 @@ void MotionDetector::compare_row(int which, int column, int row, int v, TileRow*
   const auto falloff = static_cast<float>(compared.match.falloff);
   const auto offset = static_cast<float>(compared.match.offset);
   constexpr float kUnit = 1.0F / kSmoothUnit;
-  // Beyond the picture's sides nothing is read but other rows' pixels, and nothing is made of them.
+  // Beyond the picture's sides this reads pixels of other rows, and the results are not used.
   for (int i = 0; i < kTile; ++i) {
     const auto at = static_cast<std::size_t>(i);
     const float light = gain *
@@ -273,7 +276,7 @@ void MotionDetector::compare_tile(int column, int row) {
     std::int16_t* out = regions_.z() + static_cast<std::ptrdiff_t>(v) * options_.width;
     TileRow least{};
     bool any = true;
-    // Where nothing in the row differs from one of them, the others are not asked.
+    // If nothing in the row differs from one of them, the others are not compared.
     for (int k = 0; k < tile.count && any; ++k) {
       TileRow z;
       compare_row(tile.which[static_cast<std::size_t>(k)], column, row, v, &z);
@@ -292,7 +295,7 @@ void MotionDetector::compare_tile(int column, int row) {
   }
 }
 
-// True where that cannot be told, too.
+// True also if it cannot be decided.
 bool MotionDetector::differs_from_recent(const DetectionBox& box) {
   const int which = earlier_.first_recent();
   const Compared& recent = compared_[static_cast<std::size_t>(which)];

@@ -11,9 +11,9 @@
 namespace alidade {
 namespace {
 
-constexpr int kPaddingGrey = 114;  // as the networks were taught with
+constexpr int kPaddingGrey = 114;  // as in the networks' training
 
-// Of an output: where a candidate's value is.
+// Layout of an output: where a candidate's values are.
 struct Layout {
   bool values_first = false;  // 1 x values x candidates
   int candidates = 0;
@@ -30,7 +30,7 @@ std::string shape_of(const cv::Mat& output) {
   return shape;
 }
 
-// As YOLO's three grids have, of strides 8, 16 and 32.
+// Number of places of YOLO's three grids, of strides 8, 16 and 32.
 int places_of(const NetworkOptions& options) {
   int places = 0;
   for (const int stride : {8, 16, 32})
@@ -40,7 +40,8 @@ int places_of(const NetworkOptions& options) {
 
 bool layout_of(const cv::Mat& output, const NetworkOptions& options, Layout* layout) {
   if (output.dims != 3 || output.size[0] != 1 || output.type() != CV_32F) return false;
-  // Small inputs have fewer candidates than values; others than YOLO's own have other grids.
+  // Small inputs have fewer candidates than values. Networks other than YOLO's own have other
+  // grids.
   const int places = places_of(options);
   const bool as_v8 = output.size[2] == places;
   const bool as_v5 = output.size[1] == 3 * places;
@@ -58,9 +59,9 @@ int values_between(const cv::dnn::MatShape& shape, std::size_t first, std::size_
   return values;
 }
 
-// OpenCV 4.6 forgets the shape of a constant that multiplies, and lays its values along the axes
-// from 1 on. YOLOv8's strides, 1 x N for boxes of 1 x 4 x N, belong elsewhere: ONNX aligns shapes at
-// their ends. Layers that cannot work as they are get the axis where that holds.
+// OpenCV 4.6 loses the shape of a constant factor, and lays its values along the axes from 1 on.
+// YOLOv8's strides, 1 x N for boxes of 1 x 4 x N, belong elsewhere, as ONNX aligns shapes at their
+// ends. Sets the axis for that in layers that cannot work as they are.
 void align_constant_factors(cv::dnn::Net& net, const cv::dnn::MatShape& input) {
   for (const auto& name : net.getLayerNames()) {
     const int id = net.getLayerId(name);
@@ -80,7 +81,7 @@ void align_constant_factors(cv::dnn::Net& net, const cv::dnn::MatShape& input) {
   }
 }
 
-// OpenCV logs what it also throws: the caller is told once.
+// OpenCV also logs what it throws; this silences it, as the caller gets the error.
 class SilentLog {
  public:
   SilentLog() : before_(cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT)) {}
@@ -98,12 +99,12 @@ struct NetworkDetector::Network {
   cv::dnn::Net net;
   Layout layout;
   cv::Mat scaled, input, blob, output;
-  cv::Rect of_picture;  // in the input
+  cv::Rect of_picture;  // within the input
   std::vector<cv::Rect2d> places;
   std::vector<float> scores;
   std::vector<int> classes, kept;
 
-  // The picture into the input's middle.
+  // Scales the picture into the input's middle.
   void letterbox(const cv::Mat& grey, const NetworkOptions& options) {
     const double scale = std::min(static_cast<double>(options.width_px) / grey.cols,
                                   static_cast<double>(options.height_px) / grey.rows);
@@ -119,7 +120,7 @@ struct NetworkDetector::Network {
     cv::cvtColor(scaled, input, cv::COLOR_GRAY2BGR);
   }
 
-  // In the picture's pixels.
+  // Reads the candidates, in the picture's pixels.
   void read_candidates(const cv::Size& picture, double threshold) {
     places.clear();
     scores.clear();
@@ -153,7 +154,7 @@ struct NetworkDetector::Network {
     }
   }
 
-  // YOLOX's boxes before they are decoded and normalised ones have their middles near 0.
+  // Normalised boxes, and a YOLOX's before decoding, have their middles near 0.
   [[nodiscard]] bool places_are_pixels(const NetworkOptions& options) const {
     const auto* values = output.ptr<float>();
     const int step = layout.values_first ? 1 : layout.before_classes() + layout.classes;
@@ -163,7 +164,7 @@ struct NetworkDetector::Network {
     return false;
   }
 
-  // Once, before forward(). False: as there.
+  // Call once before forward(). False: as there.
   bool prepare() {
     try {
       align_constant_factors(net, {1, 3, input.rows, input.cols});
@@ -173,7 +174,7 @@ struct NetworkDetector::Network {
     return true;
   }
 
-  // False: the network is not for this input.
+  // False: the network does not take this input.
   bool forward() {
     try {
       cv::dnn::blobFromImage(input, blob, 1.0 / 255);

@@ -10,7 +10,7 @@
 namespace alidade {
 namespace {
 
-// The SVM's window, and the person in it.
+// The SVM's window, and the person within it.
 constexpr int kWindowWidth_px = 64;
 constexpr int kWindowHeight_px = 128;
 constexpr double kPersonHeight_px = 96;
@@ -41,7 +41,7 @@ struct PersonDetector::Hog {
 
   Hog() { descriptor.setSVMDetector(cv::HOGDescriptor::getDefaultPeopleDetector()); }
 
-  // Rows [top, bottom) of the image, scaled.
+  // Searches rows [top, bottom) of the image, scaled.
   void look(const ImageView& image, int top, int bottom, double scale, double threshold,
             std::vector<DetectionBox>* boxes) {
     const cv::Mat part(bottom - top, image.width, CV_8U, const_cast<std::uint8_t*>(image.row(top)),
@@ -49,7 +49,7 @@ struct PersonDetector::Hog {
     const cv::Size size(cvRound(image.width * scale), cvRound((bottom - top) * scale));
     if (size.width < kWindowWidth_px || size.height < kWindowHeight_px) return;
     cv::resize(part, scaled, size, 0, 0, scale < 1 ? cv::INTER_AREA : cv::INTER_LINEAR);
-    // Windows may reach beyond the edges by what is empty about a person.
+    // Windows may reach beyond the edges by the empty space around a person.
     descriptor.detect(scaled, places, weights, threshold, {kStride_px, kStride_px}, {16, 16});
     const double scale_u = static_cast<double>(size.width) / image.width;
     for (std::size_t i = 0; i < places.size() && boxes->size() < kMostHits; ++i) {
@@ -95,7 +95,7 @@ PersonDetector::PersonDetector(const PersonOptions& options)
 
 PersonDetector::~PersonDetector() = default;
 
-// From below upwards, in the picture's middle column. Feet may be below the picture by as much as the window's empty part.
+// Bands from the bottom upwards, along the picture's middle column.
 void PersonDetector::find_bands(const FrameOrientation& frame, const WorldPlane& plane, int width,
                                 int height) {
   bands_.clear();
@@ -107,7 +107,7 @@ void PersonDetector::find_bands(const FrameOrientation& frame, const WorldPlane&
       continue;
     }
     const double top = row - kRowStep_px;
-    // Heights fall upwards; the band's is that of its lower edge until it is complete.
+    // Heights decrease upwards. A band has the height of its lower edge until it is complete.
     if (!bands_.empty() && bands_.back().top == row &&
         bands_.back().height_px <= options_.height_step * target.height_px &&
         target.height_px <= options_.height_step * bands_.back().height_px) {
@@ -119,7 +119,7 @@ void PersonDetector::find_bands(const FrameOrientation& frame, const WorldPlane&
 }
 
 void PersonDetector::look_at(const ImageView& image, const Band& band) {
-  // Of what a band's people measure, from height_px down to that over height_step.
+  // The middle of the heights in the band, from height_px down to that over height_step.
   const double height = band.height_px / std::sqrt(options_.height_step);
   const double scale = kPersonHeight_px / height;
   const double above = 1.2 * band.height_px + kStride_px / scale;
@@ -159,7 +159,7 @@ PersonStatus PersonDetector::find(const ImageView& image, const FrameOrientation
   for (const Band& band : bands_) {
     const std::size_t first = boxes_.size();
     look_at(image, band);
-    // Those of other bands are found there.
+    // People of other bands are found there.
     const auto wrong = [&](const DetectionBox& box) {
       const double foot = box.v + box.height;
       const double slack = kStride_px / kPersonHeight_px * box.height;

@@ -1,11 +1,12 @@
 #pragma once
-// People who stand upright, by OpenCV's HOG and its SVM (Dalal and Triggs 2005), at the one scale that the world plane tells (Lisanti et al.,
-// section 4.1): how tall somebody is in the picture where the feet are at a row (target_scale.h).
-// The picture is taken in bands of foot rows, in each of which that height varies by less than height_step; a band, with room for heads, is
-// scaled so that people are as tall as the SVM was taught, 96 px, and looked at once. What stands in another band, or is not as tall as
-// its own feet's place says, is dropped; of what overlaps, the surest stays. For comparison: at all scales.
-// Where the height in pixels is outside [least_height_px, most_height_px] nobody is looked for. Score: distance from the SVM's plane.
-// Scratch memory is taken as OpenCV does: not for the real-time thread. For one thread.
+// PersonDetector: upright people, by OpenCV's HOG and its SVM (Dalal and Triggs 2005), at the one
+// scale that follows from the world plane (Lisanti et al., section 4.1; target_scale.h).
+// The picture is searched in bands of foot rows within which a person's height varies by less than
+// height_step. A band, with room for heads, is scaled so that people are 96 px tall, as the SVM was
+// trained, and searched once. A person of another band, or of a height that does not fit the place
+// of the feet, is dropped; of overlapping ones the surest stays. Outside [least_height_px,
+// most_height_px] nothing is searched. Score: distance from the SVM's plane. Takes scratch memory
+// as OpenCV does: not for the real-time thread. For one thread.
 
 #include <memory>
 #include <vector>
@@ -19,12 +20,12 @@ namespace alidade {
 
 struct PersonOptions {
   double height_m = 1.75;         // of people
-  double height_tolerance = 0.2;  // log of heights over each other: of a person and height_m
-  double height_step = 1.1;       // of pixels' heights within a band, above 1
+  double height_tolerance = 0.2;  // |log| of a person's height over height_m
+  double height_step = 1.1;       // largest ratio of heights in px within a band; > 1
   double least_height_px = 48;
   double most_height_px = 480;
   double threshold = 0;        // of the score
-  double most_overlap = 0.45;  // of two boxes that stay
+  double most_overlap = 0.45;  // of two boxes that both stay
   int most_boxes = 64;
 
   [[nodiscard]] bool validate(const char** error = nullptr) const;
@@ -32,16 +33,17 @@ struct PersonOptions {
 
 enum class PersonStatus {
   kOk,
-  kNoImage,        // not valid, or not of the size of the orientation's calibration
+  kNoImage,        // not valid, or not of the calibration's size
   kNoOrientation,  // mode none
-  kNowhere  // people would be too small or too large everywhere, or there is no ground in view
+  // Everywhere people would be too small or too large, or no ground is in view.
+  kNowhere
 };
 
 [[nodiscard]] const char* to_string(PersonStatus status);
 
 class PersonDetector {
  public:
-  // options are valid.
+  // options must be valid.
   explicit PersonDetector(const PersonOptions& options);
   ~PersonDetector();
   PersonDetector(const PersonDetector&) = delete;
@@ -49,9 +51,9 @@ class PersonDetector {
 
   [[nodiscard]] PersonStatus find(const ImageView& image, const FrameOrientation& frame,
                                   const WorldPlane& plane);
-  // Of any height between the least and the most, in steps of 5 %, anywhere.
+  // For comparison: any height from least to most, in steps of 5 %, anywhere.
   [[nodiscard]] PersonStatus find_at_all_scales(const ImageView& image);
-  // Of the latest picture, the surest first.
+  // Of the latest picture, surest first.
   [[nodiscard]] const std::vector<DetectionBox>& boxes() const { return boxes_; }
 
  private:

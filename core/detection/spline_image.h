@@ -1,9 +1,10 @@
 #pragma once
-// Pictures seen through the cubic B-spline (sampling.h): at pixel centres and between them the blur is nearly the same, so two pictures may be
-// compared at any fraction of a pixel without what interpolation would do to them, 0.001 px worth. White noise becomes 0.46 to 0.5 times
-// as large in each direction.
-//   smooth_image   at all pixel centres: weights (1 4 1) / 6 both ways, exactly, in units of 1/36 grey level
-//   spline_value   anywhere, weights to the nearest 1/64 px
+// Pictures smoothed by the cubic B-spline (sampling.h). The blur is nearly the same at pixel
+// centres and between them. So two pictures can be compared at any fraction of a pixel without
+// interpolation errors, to 0.001 px. The variance of white noise falls to 0.46 to 0.5 of itself in
+// each direction.
+//   smooth_image   at all pixel centres: weights (1 4 1) / 6 both ways, exact, in 1/36 grey level
+//   spline_value   anywhere, with weights for the nearest 1/64 px
 
 #include <array>
 #include <cstdint>
@@ -15,7 +16,7 @@
 namespace alidade {
 
 inline constexpr int kSmoothUnit = 36;  // of a grey level
-// How far from the edges spline_value() has all its pixels, px.
+// px; distance from the edges at which spline_value() has all its pixels.
 inline constexpr float kSplineMargin = 2;
 
 namespace internal {
@@ -25,16 +26,16 @@ extern const std::array<std::array<float, 4>, kSplineSteps + 1> kSplineWeights;
 
 }  // namespace internal
 
-// out: width * height, row after row; the outermost pixels are not smoothed.
+// out: width * height, row by row. The outermost pixels are not smoothed.
 void smooth_image(const ImageView& image, std::uint16_t* out);
 
-// Grey levels. u, v at least kSplineMargin from every edge.
+// In grey levels. u, v: at least kSplineMargin from every edge.
 [[nodiscard]] inline float spline_value(const ImageView& image, float u, float v) {
   const float x = u - 1.5F;
   const float y = v - 1.5F;
   const int column = static_cast<int>(x);
   const int row = static_cast<int>(y);
-  // t is not negative, and std::lround() would be a call for each sample.
+  // t is not negative; std::lround() would be a call for each sample.
   const auto step = [](float t) {
     constexpr float kHalf = 0.5F;
     return static_cast<std::size_t>(t * static_cast<float>(internal::kSplineSteps) + kHalf);

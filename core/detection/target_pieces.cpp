@@ -20,11 +20,12 @@ constexpr double kBetweenNear = 1.0 / 3;  // of c
 constexpr double kChangedShare = 0.5;
 constexpr double kChangedNear = 0.5;  // of c
 constexpr int kPieceZ = 5 * ChangeRegions::kUnit / 2;
-// Of a box, each way, that are looked at; and of the line between two, which is shorter.
+// Limits of sampling: pixels of a box each way, and of the line between two boxes, which is
+// shorter.
 constexpr int kMostAcross = 32;
 constexpr std::size_t kMostBetween = 512;
 
-// act(z, grey) of a box's changed pixels.
+// act(|z|, grey) for a box's changed pixels.
 template <typename Act>
 void each_changed(const SmoothedView& now, const std::int16_t* z, const DetectionBox& box,
                   Act&& act) {
@@ -37,7 +38,7 @@ void each_changed(const SmoothedView& now, const std::int16_t* z, const Detectio
   }
 }
 
-// Whether what lies between is what this box shows.
+// Whether this box shows what lies between.
 bool shows(const SmoothedView& now, const std::int16_t* z, double sigma_grey,
            const DetectionBox& box, const int* between, std::size_t count) {
   const int middle = between[count / 2];

@@ -1,11 +1,12 @@
 #pragma once
-// A target that is large for its speed changes the picture along its outline only: where its inside is of one grey level, that lies over itself in the
-// earlier pictures. The pieces of the outline then stand around what has not changed and has the target's grey level, which is what most of the changed
-// pixels of one of them show, too:
-//   |g - m| < c / 3   for three quarters of the pixels between,   |g - m| < c / 2   for most of the changed ones of a box   =>   both boxes are of one thing
-// g: grey level, m the median of the pixels on the line between the boxes' middles, c by how much the box's changed pixels differ from before, the mean: what is nearer
-// to m than c / 2 is not the scene. Boxes are no farther apart than twice the larger of them is large. Two targets before an
-// even sky stay two: between them is the sky, which neither shows; so do two before a scene of many grey levels. A box that has grown takes what it has come near to.
+// join_target_pieces(): a target that is large for its speed changes the picture only along its
+// outline, as its inside of one grey level lies over itself in the earlier pictures. Pieces of the
+// outline stand around the unchanged inside, whose grey level most changed pixels of one piece show
+// as well. Two boxes are of one thing if
+//   |g - m| < c / 3   for three quarters of the pixels between, and
+//   |g - m| < c / 2   for most changed pixels of one of the boxes
+// g: grey level, m: its median on the line between the boxes' middles, c: mean change of the box's
+// changed pixels. Conditions and limits: docs/derivations.md.
 
 #include <vector>
 
@@ -15,8 +16,9 @@
 
 namespace alidade {
 
-// Joins boxes of one thing, as long as they come to no more than most_size_px; the order of the others stays. z: what the boxes were made of
-// (change_regions.h), row after row; sigma_grey: a difference of that many grey levels is a z of 1 in an even area.
+// Joins boxes of one thing up to most_size_px; the others keep their order. z: row by row, as the
+// boxes were made from (change_regions.h). sigma_grey: grey levels of a difference with z = 1 in an
+// even area.
 void join_target_pieces(const SmoothedView& now, const std::int16_t* z, double sigma_grey,
                         const ChangeOptions& options, std::vector<DetectionBox>* boxes);
 

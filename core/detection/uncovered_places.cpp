@@ -13,11 +13,11 @@ namespace {
 using internal::size_of;
 
 constexpr double kNear = 0.5;
-// Small parts of a target's outline tell nothing of its size.
+// Small parts of a target's outline do not show its size.
 constexpr double kLeastReach_px = 12;
 constexpr int kChangedZ = 5 * ChangeRegions::kUnit / 2;
 
-// Of a box's changed pixels that changed as its sum did.
+// Of a box's pixels that changed in the same sense as their sum.
 struct Change {
   bool brighter;
   double grey;  // now
@@ -41,7 +41,7 @@ Change change_of(const SmoothedView& now, const std::int16_t* z, const Detection
   return {which == 1, greys[which] / std::max(pixels[which], 1)};
 }
 
-// Mean of what lies between. False: there is nothing.
+// Mean grey level between two boxes. False: there is nothing between.
 bool grey_between(const SmoothedView& now, const DetectionBox& a, const DetectionBox& b,
                   double* grey) {
   double sum = 0;
@@ -70,7 +70,7 @@ void drop_uncovered_places(const SmoothedView& now, const std::int16_t* z,
     return here.brighter != there.brighter && grey_between(now, box, front, &between) &&
            std::abs(between - there.grey) < kNear * std::abs(between - here.grey);
   };
-  // A negative score marks it: a box that goes may tell of another one that it goes, too.
+  // A negative score marks a box to drop, which may still show that another one is to be dropped.
   for (DetectionBox& box : *boxes) {
     const bool uncovered = std::any_of(
         boxes->begin(), boxes->end(),

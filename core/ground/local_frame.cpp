@@ -44,7 +44,7 @@ GeodeticPosition LocalFrame::geodetic(const Vector3<double>& local_m) const {
   const double polar = 1 - kFlattening;  // b / a
   GeodeticPosition position;
   position.longitude = out > 0 ? std::atan2(x.y(), x.x()) : origin_.longitude;
-  // tan of the parametric latitude; as sine and cosine, so that the poles are nothing special.
+  // tan of the parametric latitude as sine and cosine, so that the poles are no special case.
   double sine = x.z();
   double cosine = polar * out;
   for (int i = 0; i < 5; ++i) {

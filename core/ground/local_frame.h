@@ -1,12 +1,12 @@
 #pragma once
-// Latitude, longitude and height to metres east, north and up of an origin, and back: WGS84.
-//   Earth-centred from geodetic   n = a / sqrt(1 - e^2 sin^2 lat);  x = (n + h) cos lat cos lon, y = (n + h) cos lat sin lon,
-//                                 z = (n (1 - e^2) + h) sin lat
-//   local from Earth-centred      R (x - x_origin), rows of R: east, north, up at the origin
-//   back                          Bowring 1976, repeated until it stands still
-// The plane Z = 0 of the local frame touches the ellipsoid's parallel surface through the origin: ground at sea level lies 8 cm below
-// it a kilometre off, 2 m at five. Heights are above the ellipsoid, not above the sea: only their differences from the origin's count.
-// Angles in rad. Domain: |latitude| <= pi / 2, heights from -10 to 100 km. No allocation.
+// LocalFrame: latitude, longitude and height to metres east, north and up of an origin, and back
+// (WGS84).
+//   n = a / sqrt(1 - e^2 sin^2 lat);  x = (n + h) cos lat cos lon, y = (n + h) cos lat sin lon,
+//   z = (n (1 - e^2) + h) sin lat;    local = R (x - x_origin), rows of R: east, north, up
+// Back: Bowring 1976, iterated. The plane Z = 0 touches the ellipsoid's parallel surface at the
+// origin: level ground lies 8 cm below it at one kilometre, 2 m at five. Heights are above the
+// ellipsoid, not the sea; only differences from the origin's count. Angles in rad. Domain:
+// |latitude| <= pi / 2, heights -10 to 100 km. No allocation.
 
 #include "core/model/linear_algebra.h"
 

@@ -1,6 +1,6 @@
 #pragma once
-// A world plane as files and answers have it: six values that mean something to a person, with their covariance, and where on Earth
-// its frame is, if that is known. No allocation.
+// A world plane in the six values of files and answers, with their covariance, and its frame's
+// place on Earth if known. No allocation.
 
 #include <Eigen/LU>
 #include <array>
@@ -13,10 +13,10 @@ namespace alidade {
 
 struct PlaneEstimate {
   WorldPlane plane;
-  std::optional<GeodeticPosition> origin;  // x is east and y north of it
+  std::optional<GeodeticPosition> origin;  // of w; x is then east, y north
 };
 
-// heading, pitch, roll of the base (rad, BaseAttitude); place of the camera (m).
+// heading, pitch, roll of the base (rad, BaseAttitude); x, y, height of the camera (m).
 inline constexpr std::array<const char*, kPlaneParameterCount> kPlaneValueNames = {
     "heading", "pitch", "roll", "x", "y", "height"};
 
@@ -25,7 +25,8 @@ struct PlaneValues {
   PlaneCovariance covariance;
 };
 
-// The base's forward direction must not point straight up or down (kLeastForward): its heading would mean nothing.
+// The base's forward direction must not point straight up or down (kLeastForward), as heading is
+// then undefined.
 [[nodiscard]] inline PlaneValues plane_values(const WorldPlane& plane) {
   const BaseAttitude attitude = base_attitude(plane);
   PlaneValues out;
@@ -34,7 +35,7 @@ struct PlaneValues {
   J.topLeftCorner<3, 3>() = attitude_jacobian(attitude).inverse();
   out.covariance = J * plane.covariance * J.transpose();
   out.covariance = (out.covariance + out.covariance.transpose()).eval() / 2;
-  // A heading that is defined has none but rounding.
+  // A heading that is defined by the base has no variance but rounding.
   if (out.covariance(0, 0) < 1e-20 * out.covariance.topLeftCorner<3, 3>().trace()) {
     out.covariance.row(0).setZero();
     out.covariance.col(0).setZero();

@@ -1,15 +1,8 @@
 #pragma once
-// What is known of the ground under a camera, as fit_plane() (plane_fit.h) takes it: any mix of data, each with its errors.
-//   height, place, level, heading   of the camera and its base, by themselves
-//   point        a direction to what has a known place in w, on the plane or above it
-//   horizon      a direction at no elevation: of the horizon, or the vanishing point of a line on the plane
-//   bearing      such a direction whose heading is known, too: of a street in a map
-//   vertical     the vanishing point of upright edges: straight up or straight down
-//   length       directions to two points of the plane at a known distance from one another
-//   upright      directions to foot and head of something that stands on the plane, of known height
-// Directions are those of the base frame, unit length. Errors of different data are independent, but for those that sights from one
-// picture share: the turn of the whole picture, its look. All sigmas above 0: what is exact gets a small one. SI and rad. Allocates
-// (names).
+// What is known of the ground under a camera, for fit_plane() (plane_fit.h): any mix of data, each
+// with its errors. Directions are in the base frame, of unit length. Errors of different data are
+// independent, except for sights from one picture, which share the turn of the picture: its look.
+// All sigmas > 0; exact values get a small one. SI and rad. Allocates (names).
 
 #include <string>
 #include <utility>
@@ -23,9 +16,17 @@ namespace alidade {
 struct PlaneSight {
   Vector3<double> d_b = Vector3<double>::UnitX();
   Matrix2<double> covariance = Matrix2<double>::Identity();  // rad^2, in tangent_basis(d_b)
-  int look = -1;  // of PlaneEvidence::looks; -1: nothing shared
+  int look = -1;  // index of PlaneEvidence::looks; -1: none
 };
 
+// kHeight, kPlace, kLevel, kHeading: of the camera or its base.
+// kPoint: direction to something with a known place in w, on the plane or above it.
+// kHorizon: direction of no elevation: of the horizon, or the vanishing point of a line on the
+// plane.
+// kBearing: such a direction with known heading, as of a street in a map.
+// kVertical: vanishing point of upright edges: straight up or straight down.
+// kLength: directions to two points of the plane at a known distance.
+// kUpright: directions to foot and head of something of known height that stands on the plane.
 enum class PlaneDatumKind {
   kHeight,
   kPlace,
@@ -41,13 +42,13 @@ enum class PlaneDatumKind {
 
 [[nodiscard]] const char* to_string(PlaneDatumKind kind);
 
-// Made by the functions below.
+// Use the functions below to make one.
 struct PlaneDatum {
   PlaneDatumKind kind = PlaneDatumKind::kHeight;
   std::string name;
   PlaneSight sight;                                 // point, horizon, bearing, vertical; foot; from
   PlaneSight other;                                 // head; to
-  Vector3<double> place = Vector3<double>::Zero();  // m, in w; level: up_b
+  Vector3<double> place = Vector3<double>::Zero();  // m, in w; for a level up_b
   Vector3<double> place_sigma = Vector3<double>::Ones();  // m
   double value = 0;                                       // m or rad
   double sigma = 1;
@@ -55,9 +56,9 @@ struct PlaneDatum {
 
 struct PlaneEvidence {
   std::vector<PlaneDatum> data;
-  std::vector<Matrix3<double>>
-      looks;                // covariance of each look's turn, rad^2, about the base's axes
-  bool y_is_north = false;  // places are of the earth: a heading has to come from the data
+  // Covariance of each look's turn about the base's axes, rad^2.
+  std::vector<Matrix3<double>> looks;
+  bool y_is_north = false;  // places are on Earth: a heading must come from the data
 };
 
 [[nodiscard]] inline PlaneDatum camera_height(double height_m, double sigma_m) {
@@ -78,7 +79,7 @@ struct PlaneEvidence {
   return out;
 }
 
-// Of the base against gravity, see R_base_from_world_of(); sigma of each of the two tilts.
+// Level of the base against gravity, see R_base_from_world_of(). sigma: of each of the two tilts.
 [[nodiscard]] PlaneDatum base_level(double pitch_rad, double roll_rad, double sigma_rad);
 
 [[nodiscard]] inline PlaneDatum base_heading(double heading_rad, double sigma_rad) {

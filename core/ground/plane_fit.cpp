@@ -17,7 +17,7 @@ using internal::PlaneSolution;
 namespace {
 
 constexpr int kMostStarts = 12;
-// Of a residual's variance that must be left for others to have checked it.
+// Share of a residual's variance that must be left for other data to have checked it.
 constexpr double kLeastChecked = 0.01;
 
 bool is_sight_good(const PlaneSight& sight, std::size_t looks) {
@@ -61,7 +61,7 @@ PlaneFit refused(PlaneFitStatus status, std::string message) {
   return out;
 }
 
-// Points of which no two others span more than a line with them: to a thousandth of their extent.
+// Whether the points lie in one line, to a thousandth of their extent.
 bool points_in_a_line(const PlaneEvidence& evidence) {
   Vector3<double> mean = Vector3<double>::Zero();
   int count = 0;
@@ -105,7 +105,7 @@ BestSolution solve_all(const PlaneProblem& problem, const WorldPlane* also = nul
     if (!out.best || solution.objective < out.best->objective) out.best = solution;
   }
   if (!out.best) return out;
-  // What is less likely than the best by e^-6 at the most: nothing prefers the best to it.
+  // Solutions less likely than the best by e^-6 at most are taken as equally good.
   const double limit = out.best->objective + 12;
   const auto stands_upright = [](const PlaneSolution& s) { return s.state.plane.up_b().z() < 0; };
   if (!stands_upright(*out.best)) {
@@ -123,7 +123,7 @@ BestSolution solve_all(const PlaneProblem& problem, const WorldPlane* also = nul
   return out;
 }
 
-// The information on the plane's unknowns alone, looks eliminated.
+// Information of the plane's unknowns alone, looks eliminated.
 Eigen::MatrixXd plane_information(const PlaneSolution& solution) {
   const Eigen::Index k = solution.unknowns.cols();
   const Eigen::Index z = solution.information.rows() - k;
@@ -145,7 +145,7 @@ const char* how_to_hold(const std::string& what) {
   return "give the camera's place or another known point";
 }
 
-// The length that a direction's error is to be seen by: how far the points are, or the height.
+// Length by which a direction's error counts: distance of the farthest point, or the height.
 double length_scale(const PlaneEvidence& evidence, const WorldPlane& plane) {
   double scale = plane.height();
   for (const PlaneDatum& datum : evidence.data) {
@@ -155,7 +155,7 @@ double length_scale(const PlaneEvidence& evidence, const WorldPlane& plane) {
   return scale;
 }
 
-// What of the plane a change of (xi, p) moves most, lengths in `scale`.
+// Which parts of the plane a change of (xi, p) moves most; lengths in `scale`.
 std::string moved_most(const Matrix<double, kPlaneParameterCount, 1>& change, double scale) {
   const std::vector<std::pair<std::string, double>> parts = {
       {"tilt", change.head<2>().norm()},
@@ -182,14 +182,15 @@ PlaneFit undetermined(const PlaneEvidence& evidence, const std::string& what) {
                                                     " not determined: " + how_to_hold(first));
 }
 
-// Fills the plane's covariance. False with a refusal if something is free or too uncertain.
+// Sets the plane's covariance. False, with a refusal in *out, if something is free or too
+// uncertain.
 bool set_covariance(const PlaneEvidence& evidence, const PlaneFitOptions& options,
                     const PlaneSolution& solution, PlaneFit* out) {
   const Eigen::MatrixXd information = plane_information(solution);
   const internal::PlaneUnknowns& N = solution.unknowns;
   const double height = solution.state.plane.height();
   const double scale = length_scale(evidence, solution.state.plane);
-  // Lengths in one scale, so that directions can be compared.
+  // Lengths are scaled, so that directions can be compared.
   Eigen::VectorXd unit = Eigen::VectorXd::Ones(N.cols());
   for (Eigen::Index i = 0; i < N.cols(); ++i) {
     if (!N.col(i).tail<3>().isZero(0)) unit[i] = scale;
@@ -227,8 +228,9 @@ bool set_covariance(const PlaneEvidence& evidence, const PlaneFitOptions& option
   return true;
 }
 
-// Whether chi-square grows as the covariance says it does, three sigmas along each of its axes: by 9, or at least as 9 is to 4. Where
-// another solution lies near it does not, and neither sigmas nor the plane can be believed.
+// Whether chi-square grows by about 9 at three sigmas along each axis of the covariance: by more
+// than 4 and less than 20.25. If another solution is near it does not, and neither sigmas nor plane
+// can be trusted.
 bool grows_evenly(const PlaneProblem& problem, const PlaneSolution& solution) {
   const Eigen::MatrixXd covariance = solution.information.ldlt().solve(
       Eigen::MatrixXd::Identity(solution.information.rows(), solution.information.cols()));
@@ -242,7 +244,7 @@ bool grows_evenly(const PlaneProblem& problem, const PlaneSolution& solution) {
                                  unit.cwiseInverse().asDiagonal();
   const internal::SymmetricEigen eigen(scaled);
   for (Eigen::Index axis = 0; axis < k; ++axis) {
-    // The looks follow as the information has them.
+    // The looks follow as the information has it.
     const Eigen::VectorXd direction = eigen.eigenvectors().col(axis).cwiseQuotient(unit);
     const Eigen::VectorXd step =
         covariance.leftCols(k) * direction / std::sqrt(eigen.eigenvalues()[axis]);
@@ -255,8 +257,8 @@ bool grows_evenly(const PlaneProblem& problem, const PlaneSolution& solution) {
   return true;
 }
 
-// Baarda: each residual by its own covariance after the fit.
-// Returns the squares of all, summed over their dimensions; 0 for what nothing checks.
+// Baarda: each residual by its own covariance after the fit. Returns r^T Q^+ r of each datum; 0 if
+// nothing checks it.
 std::vector<double> set_misfits(const PlaneProblem& problem, const PlaneSolution& solution,
                                 PlaneFit* out) {
   std::vector<double> squares;
@@ -276,7 +278,7 @@ std::vector<double> set_misfits(const PlaneProblem& problem, const PlaneSolution
     int rank = 0;
     for (int axis = 0; axis < 2; ++axis) {
       const Vector2<double> direction = eigen.eigenvectors().col(axis);
-      // Of size 1 the second row is no datum.
+      // With size 1 the second row is no datum.
       if (residual.size == 1 && std::abs(direction[1]) > 0.5) continue;
       const double part = eigen.eigenvalues()[axis];
       fit.checked += std::max(part, 0.0) / residual.size;
@@ -292,7 +294,7 @@ std::vector<double> set_misfits(const PlaneProblem& problem, const PlaneSolution
   return squares;
 }
 
-// Without which datum the others agree best; -1 if none is beyond the gate.
+// The datum without which the others agree best; -1 if none is beyond the gate.
 int find_gross(const PlaneProblem& problem, const PlaneSolution& solution,
                const std::vector<double>& squares, double gate) {
   std::vector<std::pair<double, int>> suspects;
@@ -317,7 +319,7 @@ int find_gross(const PlaneProblem& problem, const PlaneSolution& solution,
   return worst;
 }
 
-// The 99.9 % point of chi-square per degree of freedom (Wilson and Hilferty).
+// 99.9 % point of chi-square per degree of freedom (Wilson and Hilferty).
 double chance_limit(int degrees) {
   const double part = 2.0 / (9.0 * degrees);
   const double root = 1 - part + 3.09 * std::sqrt(part);

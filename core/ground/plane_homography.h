@@ -1,13 +1,12 @@
 #pragma once
-// The third paper's forms of the plane (Lisanti et al., eqs. 10 to 13), for a camera without distortion whose rows are exposed at once:
-//   image from plane      G^-1 ~ K R_camera_from_base R_base_from_world [e_x, e_y, -p]
-//   plane from image      G = H_W H_rk H^-1                         (10); H_rk H^-1: image to mosaic, by rotations K_m R K^-1
-//   plane from mosaic     H_W = H_s H_p                              (11); H_p from two vanishing points, H_s from two known points
-//   head from foot        W = I + (mu - 1) v l^T / (v . l)           (13), h ~ W p (12)
-// l: the plane's vanishing line (horizon), v = K K^T l its normal's vanishing point, mu = 1 - target height / camera height the cross
-// ratio. The paper writes l = G [0, 0, 1]^T for G as a map of lines; for G as a map of points, as here, that is l = G^T [0, 0, 1]^T.
-// They are equal to the direct geometry of world_plane.h and are tested so; the program uses the direct one, which has the distortion
-// and the rows. Homographies are up to scale. No allocation.
+// The plane as in Lisanti et al. (eqs. 10 to 13), for a camera without distortion whose rows are
+// exposed at once:
+//   image from plane   G^-1 ~ K R_camera_from_base R_base_from_world [e_x, e_y, -p]
+//   plane from image   G = H_W H_rk H^-1      (10); H_rk H^-1: image to mosaic, K_m R K^-1
+//   plane from mosaic  H_W = H_s H_p           (11); from two vanishing points and two known points
+//   head from foot     W = I + (mu - 1) v l^T / (v . l)                         (13), h ~ W p (12)
+// Tests compare them with world_plane.h, which the program uses. Homographies are up to scale. No
+// allocation. Notation: docs/derivations.md.
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
@@ -17,7 +16,7 @@
 
 namespace alidade {
 
-// K, of a camera without distortion.
+// K of a camera without distortion.
 [[nodiscard]] inline Matrix3<double> camera_matrix(const Camera<double>& camera) {
   const Vector2<double> centre = camera.optical_centre();
   Matrix3<double> K;
@@ -27,7 +26,7 @@ namespace alidade {
   return K;
 }
 
-// Of two pictures by one optical centre: H_infinity.
+// Between two pictures from one optical centre: H_infinity.
 [[nodiscard]] inline Matrix3<double> image_from_image(const Matrix3<double>& K_to,
                                                       const Matrix3<double>& R_to_from,
                                                       const Matrix3<double>& K_from) {
@@ -42,8 +41,8 @@ namespace alidade {
   return K * R_camera_from_base * plane.R_base_from_world * columns;
 }
 
-// H_p: from the vanishing points (px) of two directions of the plane at right angles, x and y of the rectified picture, so that
-// x, y, up are right-handed. False if the two coincide.
+// H_p, from the vanishing points (px) of two perpendicular directions of the plane. They become x
+// and y of the rectified picture, so that x, y, up are right-handed. False if the two coincide.
 [[nodiscard]] inline bool rectifying_homography(const Matrix3<double>& K,
                                                 const Vector3<double>& vanishing_x,
                                                 const Vector3<double>& vanishing_y,
@@ -59,15 +58,15 @@ namespace alidade {
   return true;
 }
 
-// H_s: the similarity that takes two points of the rectified picture to where they are on the plane, |to_b - to_a| the known length.
-// False if either pair coincides.
+// H_s: the similarity that takes two points of the rectified picture to their places on the plane,
+// |to_b - to_a| the known length. False if either pair coincides.
 [[nodiscard]] inline bool similarity(const Vector2<double>& from_a, const Vector2<double>& from_b,
                                      const Vector2<double>& to_a, const Vector2<double>& to_b,
                                      Matrix3<double>* H_s) {
   const Vector2<double> from = from_b - from_a;
   const Vector2<double> to = to_b - to_a;
   if (!(from.squaredNorm() > 0) || !(to.squaredNorm() > 0)) return false;
-  // As complex numbers: turn and scale = to / from.
+  // As complex numbers: rotation and scale = to / from.
   const double real = from.dot(to) / from.squaredNorm();
   const double imaginary = (from.x() * to.y() - from.y() * to.x()) / from.squaredNorm();
   Matrix2<double> turn;

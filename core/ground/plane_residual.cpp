@@ -48,7 +48,8 @@ namespace {
 
 using PlaneRow3 = Matrix<double, 3, kPlaneParameterCount>;
 
-// A sight without its look's error, as far as that is known; errors of the direction become errors of the residual.
+// A sight corrected by its look's current error. Propagates errors of the direction to the
+// residual.
 struct TrueSight {
   const PlaneSight& sight;
   Matrix3<double> root = Matrix3<double>::Zero();
@@ -72,7 +73,8 @@ struct TrueSight {
   }
 };
 
-// to: a direction that the plane says, with its Jacobian. Residual and J by the sight's direction.
+// Residual of a direction `to` that the plane predicts, with its Jacobian, against the sight.
+// Returns the derivative by the sight's direction.
 Matrix<double, 2, 3> compare(const Vector3<double>& to, const PlaneRow3& J_to_plane,
                              const TrueSight& sight, DatumResidual* out,
                              Matrix<double, 2, 3>* J_r_to = nullptr) {
@@ -84,7 +86,7 @@ Matrix<double, 2, 3> compare(const Vector3<double>& to, const PlaneRow3& J_to_pl
   return J_from;
 }
 
-// R_base_from_world v.
+// Of R_base_from_world v.
 PlaneRow3 rotated_jacobian(const WorldPlane& plane, const Vector3<double>& v_w) {
   PlaneRow3 J = PlaneRow3::Zero();
   J.leftCols<3>() = -plane.R_base_from_world * skew(v_w);
@@ -120,7 +122,7 @@ bool horizon_residual(const TrueSight& sight, const WorldPlane& plane, DatumResi
 }
 
 void vertical_residual(const TrueSight& sight, const WorldPlane& plane, DatumResidual* out) {
-  // Up or down, whichever it is nearer to.
+  // Up or down, whichever is nearer.
   const Vector3<double> up_w =
       Vector3<double>::UnitZ() * (plane.up_b().dot(sight.d_b) < 0 ? -1 : 1);
   const Matrix<double, 2, 3> J_sight =
@@ -141,7 +143,7 @@ void bearing_residual(const PlaneDatum& datum, const TrueSight& sight, const Wor
   sight.add(J_sight, &out->covariance, &out->J_sight_look);
 }
 
-// A place on the plane from a sight.
+// The place on the plane that a sight shows.
 struct SeenPlace {
   Vector2<double> X;
   Matrix<double, 2, 3> J_X_d;

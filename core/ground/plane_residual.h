@@ -1,11 +1,12 @@
 #pragma once
-// One datum's residual: what the plane says of it, minus what was seen, and how that moves with the plane and with every error.
-//   height, place    p minus the datum                             heading          heading minus the datum, the short way
-//   level, vertical  up minus the datum, in its tangent basis       horizon          the direction's elevation
+// One datum's residual, and its derivatives by the plane and by every error.
+//   height, place    p minus the datum
+//   heading          heading minus the datum, wrapped
+//   level, vertical  up minus the datum, in its tangent basis
+//   horizon          the direction's elevation
 //   point, bearing   direction minus the sight, in its tangent basis
 //   length           distance of the two places minus the datum
-//   upright          direction of (place of the foot, height) minus the head's sight, in its tangent basis: foot eliminated
-// Looks (plane_evidence.h) are unknowns beside the plane: turn = root z, z of unit variance, root root^T the look's covariance.
+//   upright          direction of (place of the foot, height) minus the head's sight, likewise
 
 #include <Eigen/Core>
 #include <vector>
@@ -15,22 +16,25 @@
 
 namespace alidade::internal {
 
+// Looks (plane_evidence.h) are unknowns beside the plane: turn = root z, z of unit variance, root
+// root^T the look's covariance.
 struct PlaneState {
   WorldPlane plane;
-  Eigen::VectorXd looks;  // z, three of each
+  Eigen::VectorXd looks;  // z; three for each look
 };
 
-// Of size 1: the second row is 0, its variance 1.
+// With size 1 the second row is 0 and its variance is 1.
 struct DatumResidual {
   int size = 2;
   Vector2<double> r = Vector2<double>::Zero();
   Matrix<double, 2, kPlaneParameterCount> J_plane = Matrix<double, 2, kPlaneParameterCount>::Zero();
   Matrix<double, 2, 3> J_sight_look = Matrix<double, 2, 3>::Zero();  // by z of the sight's look
   Matrix<double, 2, 3> J_other_look = Matrix<double, 2, 3>::Zero();
-  Matrix2<double> covariance = Matrix2<double>::Identity();  // by the datum's own errors
+  Matrix2<double> covariance = Matrix2<double>::Identity();  // from the datum's own errors
 };
 
-// roots: of the looks' covariances. False: the datum means nothing on this plane, as a foot above the horizon.
+// roots: of the looks' covariances. False: the datum is not defined on this plane, such as a foot
+// above the horizon.
 [[nodiscard]] bool datum_residual(const PlaneDatum& datum,
                                   const std::vector<Matrix3<double>>& roots,
                                   const PlaneState& state, DatumResidual* out);

@@ -22,7 +22,7 @@ PlaneFrame frame_of(const PlaneEvidence& evidence) {
       has_heading = true;
   }
   if (places == 0) return has_heading ? PlaneFrame::kHeading : PlaneFrame::kCamera;
-  // Two places tell a heading.
+  // Two places determine a heading.
   const bool tells_heading = places > 1 || has_heading || evidence.y_is_north;
   return tells_heading ? PlaneFrame::kUser : PlaneFrame::kPlace;
 }
@@ -39,7 +39,7 @@ bool residuals_of(const PlaneProblem& problem, const PlaneState& state,
   return true;
 }
 
-// With the weights of `weights`.
+// With the covariances of `weights`.
 double chi_square(const PlaneProblem& problem, const std::vector<DatumResidual>& residuals,
                   const std::vector<DatumResidual>& weights, const PlaneState& state) {
   double sum = state.looks.squaredNorm();
@@ -69,7 +69,7 @@ PlaneUnknowns plane_unknowns(PlaneFrame frame, const WorldPlane& plane) {
     out(2, 3) = 1;
   } else {
     if (frame == PlaneFrame::kPlace) out(3, 3) = out(4, 4) = 1;
-    // The heading stays.
+    // The heading stays the same.
     const Vector3<double> J = heading_jacobian(plane);
     if (J.z() != 0) out.row(2).head<2>() = -J.head<2>().transpose() / J.z();
   }
@@ -141,7 +141,7 @@ bool solve_plane(const PlaneProblem& problem, const WorldPlane& start, PlaneSolu
     bool accepted = false;
     while (!accepted && damping < 1e12) {
       Eigen::MatrixXd damped = A;
-      // What is free gets a damping of its own, or it would have none.
+      // A free direction gets a damping of its own, as it has no information.
       damped.diagonal() +=
           damping * (A.diagonal().array() + 1e-12 * A.diagonal().maxCoeff()).matrix();
       const Eigen::VectorXd step = damped.ldlt().solve(b);
@@ -161,7 +161,7 @@ bool solve_plane(const PlaneProblem& problem, const WorldPlane& start, PlaneSolu
       }
       damping = accepted ? std::max(damping / 10, 1e-12) : damping * 10;
     }
-    // No step helps: rounding, if it is small.
+    // If no step helps, the rest is rounding.
     if (!accepted) break;
   }
   if (!rests && steps == kMostSteps) return false;

@@ -22,7 +22,8 @@ const PlaneDatum* first_of(const PlaneProblem& problem, Kind kind) {
   return nullptr;
 }
 
-// Directions that are at right angles to up: of the horizon, and normals of planes through the camera that hold a vertical line.
+// The axis at right angles to all level directions: those of the horizon, and normals of planes
+// through the camera that contain a vertical line.
 std::optional<Vector3<double>> axis_of_right_angles(const PlaneProblem& problem) {
   Eigen::MatrixXd sum = Matrix3<double>::Zero();
   for (std::size_t i = 0; i < problem.evidence.data.size(); ++i) {
@@ -59,8 +60,8 @@ std::vector<Vector3<double>> ups(const PlaneProblem& problem) {
   return out;
 }
 
-// The least turn that takes z to `up_b`, a unit vector. By hand, as Eigen's FromTwoVectors() has a singular value decomposition, which
-// takes half of this source's compilation.
+// The smallest rotation that takes z to `up_b`, a unit vector. Eigen's FromTwoVectors() uses a
+// singular value decomposition, which takes half of this source's compilation.
 Matrix3<double> R_base_from_world_with(const Vector3<double>& up_b) {
   const double w = std::sqrt(std::max(0.0, 0.5 * (1 + up_b.z())));
   if (w < 1e-8) {
@@ -71,7 +72,8 @@ Matrix3<double> R_base_from_world_with(const Vector3<double>& up_b) {
       .toRotationMatrix();
 }
 
-// The height that one datum gives to a plane of height 1; nothing if it does not say.
+// The camera's height by one datum, from a plane at height 1; nothing if the datum does not give
+// it.
 std::optional<double> height_by(const PlaneDatum& datum, const WorldPlane& unit) {
   Vector2<double> a;
   Vector2<double> b;
@@ -98,7 +100,7 @@ std::optional<double> height_by(const PlaneDatum& datum, const WorldPlane& unit)
   }
 }
 
-// Place and height by all that says where the camera is, each point's ray as two equations.
+// Place and height from all data on the camera's place; a point's ray counts as two equations.
 void set_position(const PlaneProblem& problem, WorldPlane* plane) {
   WorldPlane unit = *plane;
   unit.position = Vector3<double>::UnitZ();
@@ -133,7 +135,7 @@ void set_position(const PlaneProblem& problem, WorldPlane* plane) {
   if (!(plane->position.z() > 0)) plane->position.z() = std::max(height, 0.1);
 }
 
-// How badly a start fits, such that one datum far off does not hide the others.
+// Misfit of a start; logarithmic, so that one datum far off does not hide the others.
 double badness(const PlaneProblem& problem, const WorldPlane& start) {
   const PlaneState state{
       start, Eigen::VectorXd::Zero(3 * static_cast<Eigen::Index>(problem.roots.size()))};

@@ -1,7 +1,8 @@
 #pragma once
-// Where the least squares of a plane may begin. Up: as a level or a vertical says, or at right angles to what is seen of the horizon
-// and along upright targets, or, where nothing does, any of fourteen directions; about it eight headings, where something can tell
-// them apart. Place and height follow linearly from the points, or from one height or length.
+// Starts for the least squares of a plane. Up: from a level or a vertical, or at right angles to
+// the horizon's directions and to the planes of upright targets, or any of fourteen directions.
+// About it eight headings, if data can distinguish them. Place and height follow linearly from the
+// points, or from heights and lengths.
 
 #include <vector>
 
@@ -9,7 +10,7 @@
 
 namespace alidade::internal {
 
-// The likeliest first, at most `most`.
+// The most likely first, at most `most`.
 [[nodiscard]] std::vector<WorldPlane> plane_starts(const PlaneProblem& problem, int most);
 
 }  // namespace alidade::internal

@@ -12,7 +12,7 @@ Matrix3<double> about(int axis, double angle) {
   return rotation_about(Vector3<double>(Vector3<double>::Unit(axis)), angle);
 }
 
-// Of a level base: east, north, up to north, east, down, then the heading about down.
+// Of a level base: east-north-up to north-east-down, then the heading about down.
 Matrix3<double> R_headed_from_world(double heading) {
   Matrix3<double> R_ned_from_enu;
   R_ned_from_enu << 0, 1, 0, 1, 0, 0, 0, 0, -1;
@@ -67,7 +67,7 @@ Matrix3<double> R_base_from_world_of(double heading, double pitch, double roll) 
 BaseAttitude base_attitude(const WorldPlane& plane) {
   BaseAttitude out;
   out.heading = heading(plane);
-  // Of the heading's frame, whose second axis is level: forward in its plane, then right about it.
+  // In the heading's frame, whose second axis is level: pitch of forward, then roll about it.
   const Matrix3<double> R = plane.R_base_from_world * R_headed_from_world(out.heading).transpose();
   out.pitch = std::atan2(-R(0, 2), R(0, 0));
   const Matrix3<double> rolled = R * about(1, -out.pitch).transpose();

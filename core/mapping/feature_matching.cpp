@@ -109,7 +109,7 @@ std::vector<FeatureMatch> believed_matches(const std::vector<NearFeatures>& near
            is_same(first.indexed, near[i][second].indexed)) {
       ++second;
     }
-    // Where all are one thing, the last of them bounds what stands elsewhere.
+    // If all show one thing, the last of them bounds the distance to anything else.
     if (second == near[i].size()) --second;
     if (near[i][second].indexed < 0 || !(near[i][second].square > 0)) continue;
     const double found = std::sqrt(static_cast<double>(first.square) / near[i][second].square);
@@ -118,7 +118,7 @@ std::vector<FeatureMatch> believed_matches(const std::vector<NearFeatures>& near
     squares.push_back(first.square);
     last = std::max(last, first.indexed);
   }
-  // Of those that claim the same one the nearest keeps it, the first of equals.
+  // If several match the same one, the nearest keeps it, the first of equals.
   std::vector<int> keeps(static_cast<std::size_t>(last + 1), -1);
   for (std::size_t i = 0; i < all.size(); ++i) {
     int& kept = keeps[static_cast<std::size_t>(all[i].indexed)];

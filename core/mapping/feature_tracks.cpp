@@ -10,7 +10,7 @@
 namespace alidade {
 namespace {
 
-// A forest over all features of all pictures; a root knows the pictures of its tree.
+// A forest over all features of all pictures. Each root knows the pictures of its tree.
 class FeatureForest {
  public:
   explicit FeatureForest(const std::vector<int>& features) {
@@ -26,7 +26,7 @@ class FeatureForest {
     for (const int picture : picture_of_) pictures_.push_back({picture});
   }
 
-  // -1: there is none.
+  // -1 if there is none.
   [[nodiscard]] int node(const PictureFeature& f) const {
     if (f.picture < 0 || f.picture + 1 >= static_cast<int>(first_.size()) || f.feature < 0) {
       return -1;
@@ -60,7 +60,7 @@ class FeatureForest {
   std::vector<int> first_;       // node of each picture's first feature
   std::vector<int> picture_of_;  // of each node
   std::vector<int> parent_;
-  std::vector<std::vector<int>> pictures_;  // of roots, increasing
+  std::vector<std::vector<int>> pictures_;  // of each root, increasing
 };
 
 }  // namespace

@@ -1,6 +1,7 @@
 #pragma once
-// Tracks: which features of many pictures are one thing, from matches of twos of pictures. The surest matches go first, and none
-// joins two features of one picture: the same cannot be at two places. Pure.
+// Tracks: features of many pictures that show one thing, from matches between pairs of pictures.
+// The surest matches are joined first. A match that would join two features of one picture is
+// ignored, as one thing is not at two places. Pure.
 
 #include <vector>
 
@@ -13,10 +14,11 @@ struct PictureFeature {
 
 struct TrackMatch {
   PictureFeature a, b;
-  double doubt = 0;  // the smaller the surer
+  double doubt = 0;  // smaller is surer
 };
 
-// Of two features or more, each in increasing order of pictures; features: how many each picture has. What is outside is left out.
+// Tracks of two features or more, in increasing order of pictures. features: their number in each
+// picture; matches outside are ignored.
 [[nodiscard]] std::vector<std::vector<PictureFeature>> feature_tracks(
     const std::vector<int>& features, std::vector<TrackMatch> matches);
 

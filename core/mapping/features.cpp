@@ -9,10 +9,10 @@
 namespace alidade {
 namespace {
 
-// The centre of the first pixel: Alidade's less OpenCV's.
+// Centre of the first pixel: Alidade's minus OpenCV's.
 constexpr double kPixelCentre = 0.5;
 
-// 0 or 0.25, by a blob about the centre of a pixel.
+// px; 0 or 0.25, measured on a blob at the centre of a pixel.
 double measured_offset() {
   constexpr int kSide = 65;
   constexpr int kMiddle = 32;
@@ -44,7 +44,8 @@ double opencv_sift_offset() {
   return offset;
 }
 
-// The strongest of each cell first, then the second of each, ...: the order in which features are taken.
+// The order in which features are taken: the strongest of each cell, then the second of each, and
+// so on.
 std::vector<cv::KeyPoint> spread(std::vector<cv::KeyPoint> points, const cv::Size& size,
                                  const FeatureOptions& options) {
   std::sort(points.begin(), points.end(), [](const cv::KeyPoint& a, const cv::KeyPoint& b) {
@@ -87,7 +88,7 @@ std::vector<cv::KeyPoint> spread(std::vector<cv::KeyPoint> points, const cv::Siz
   return out;
 }
 
-// The mean of each two by two pixels.
+// Means of two by two pixels.
 cv::Mat halved(const cv::Mat& image) {
   cv::Mat out(image.rows / 2, image.cols / 2, CV_8U);
   for (int v = 0; v < out.rows; ++v) {

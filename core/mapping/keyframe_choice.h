@@ -1,8 +1,9 @@
 #pragma once
-// Which pictures of a camera that turns and zooms a map keeps: taken slowly, and none near one that is there.
-//   apart   the largest of |pan| cos(tilt) / field across, |tilt| / field down and |log f| / step of two pictures, in the steps of the
-//           options; a field is what the longer focal length sees
-// A step of half a field leaves half of what is seen in common with the neighbour. Pure; allocates where a picture is kept.
+// KeyframeChoice: which pictures of a camera that turns and zooms a map keeps: slow ones, none near
+// another. Distance of two pictures: the largest of |pan| cos(tilt) / field across, |tilt| / field
+// down and |log f| / step, in the steps of the options. A field is what the longer focal length
+// sees. A step of half a field leaves half of the view in common. Pure; allocates where a picture
+// is kept.
 
 #include <algorithm>
 #include <cmath>
@@ -13,10 +14,10 @@
 namespace alidade {
 
 struct KeyframeChoiceOptions {
-  double step_fields = 0.35;         // of pan and tilt
+  double step_fields = 0.35;         // of pan and tilt, in fields of view
   double step_log_f = 0.35;          // of log f
-  double most_motion_px = 10;        // of the image while it is read out
-  double most_log_f_change = 0.002;  // likewise
+  double most_motion_px = 10;        // of the image, during the read-out
+  double most_log_f_change = 0.002;  // during the read-out
 
   [[nodiscard]] bool validate(const char** error = nullptr) const {
     const char* what = nullptr;
@@ -29,7 +30,7 @@ struct KeyframeChoiceOptions {
   }
 };
 
-// Where a picture is thought to look.
+// Estimated direction and zoom of a picture.
 struct SeenPlace {
   PanTilt<double> angle;
   double log_f = 0;
@@ -37,16 +38,16 @@ struct SeenPlace {
 
 class KeyframeChoice {
  public:
-  // The image's size, px.
+  // width, height: of the image, px.
   KeyframeChoice(int width, int height, const KeyframeChoiceOptions& options = {})
       : width_(width), height_(height), options_(options) {}
 
-  // turn_rate, rad/s; zoom_rate, d log f / dt, 1/s; readout_s: of the whole image.
+  // turn_rate: rad/s. zoom_rate: d log f / dt, 1/s. readout_s: of the whole image.
   [[nodiscard]] bool is_slow(double log_f, double turn_rate, double zoom_rate,
                              double readout_s) const {
     return haste(log_f, turn_rate, zoom_rate, readout_s) <= 1;
   }
-  // The same, over what is slow: above 1 it is not.
+  // Motion over the limit for a slow picture: above 1 the picture is not slow.
   [[nodiscard]] double haste(double log_f, double turn_rate, double zoom_rate,
                              double readout_s) const {
     return std::max(std::abs(turn_rate) * std::exp(log_f) * readout_s / options_.most_motion_px,

@@ -1,4 +1,5 @@
-// LandmarkUpkeep's new landmarks: features that no landmark explains, seen again and again, and the room that there is for them.
+// New landmarks of LandmarkUpkeep: features that no landmark explains and that are seen repeatedly,
+// and the room for them.
 
 #include <algorithm>
 #include <unordered_map>
@@ -34,7 +35,7 @@ void LandmarkUpkeep::find_candidates(const UpkeepView& view, const SceneMap& map
            scale_px < 1.5 * seen.scale &&
            squared_distance(descriptors[feature], descriptor) <= most_square;
   };
-  // What an unmatched landmark explains is none.
+  // A feature that an unmatched landmark explains is no candidate.
   std::vector<char> taken = picture->taken;
   for (const Picture::Visible& visible : picture->visible) {
     const SceneLandmark& landmark = map.landmarks[visible.index];
@@ -104,7 +105,7 @@ void LandmarkUpkeep::find_candidates(const UpkeepView& view, const SceneMap& map
     candidate.views = 1;
     kept.push_back(std::move(candidate));
   }
-  // The oldest have waited longest without being seen again.
+  // Drops the oldest, which waited longest for another sight.
   const auto most = static_cast<std::size_t>(options_.most_candidates);
   if (kept.size() > most) {
     kept.erase(kept.begin(), kept.end() - static_cast<std::ptrdiff_t>(most));
@@ -116,7 +117,7 @@ void LandmarkUpkeep::give_birth(const std::vector<SceneLandmark>& ready, double 
                                 const SceneMap& map, Picture* picture, MapChange* change,
                                 UpkeepCounts* counts) {
   if (ready.empty()) return;
-  // Who lives in the cells that are asked for.
+  // Landmarks in the cells that the new ones need.
   std::unordered_map<std::uint64_t, std::vector<const SceneLandmark*>> cells;
   for (const SceneLandmark& landmark : ready) {
     cells[sphere_cell(landmark.d_b, landmark.scale_rad, options_.cell_scales)];

@@ -1,18 +1,13 @@
 #pragma once
-// One landmark's own Kalman filter: its direction, from where pictures with a known pose see it (Lisanti et al., eqs. 7 to 9).
-//   seen from      u with sigma_px, in a picture at R, log f, of which (xi, log f) has the covariance cov_pose
-//   innovation     y = G (u - project(R, f, d)),  G = (J_u_d B_d)^-1: where it was seen, from d, in tangent_basis(d), rad
-//   eq. 8          cov_y = J_y_pose cov_pose J_y_pose^T + sigma^2 J_y_u J_y_u^T + P          pose, detection, landmark
-//   eq. 9          K = P cov_y^-1,  d <- d (+) K y;  pose and detection count 1 / news of it, where the picture says so much that is new
-// The paper counts a pose's error anew in each picture; but a pose that was found from landmarks has their common error, which no number
-// of pictures tells. So a landmark's error has two parts (scene_map.h): its own, P, filtered as above, and the common one, C, which stays
-// (a Schmidt filter's):
-//   C <- M M^T + k S,   M = (I - K) C^1/2 + K Cp^1/2,   k = trace(K) / 2
-// Cp is the common part of those that the pose was found from, taken as one and the same error with C, where it is larger (M = C^1/2
-// where it is not: C knows this place of the view). S is what their own parts have left in the pose: their mean, which stays as it is
-// while they draw closer to each other, so that what P loses of it C has to gain. Detection's part of a pose's error is new in each
-// picture, and cancels over the landmarks that gave the pose.
-// Pure; no allocation. Outputs are written with kOk only.
+// One landmark's Kalman filter on its direction, from pictures with a known pose (Lisanti, eqs.
+// 7-9):
+//   y = G (u - project(R, f, d)),  G = (J_u_d B_d)^-1   innovation, rad, B_d = tangent_basis(d)
+//   cov_y = J_y_pose cov_pose J_y_pose^T + sigma^2 J_y_u J_y_u^T + P                     (eq. 8)
+//   K = P cov_y^-1,  d <- d (+) K y                                                      (eq. 9)
+// A landmark's error has an own part, P, and a part C common with its neighbours (scene_map.h),
+// which no number of pictures reduces. It follows a Schmidt filter: C <- M M^T + k S, M = (I - K)
+// C^1/2 + K Cp^1/2, k = trace(K) / 2. Derivation: docs/derivations.md. Pure; no allocation. Outputs
+// are written with kOk only.
 
 #include <Eigen/LU>
 #include <cmath>
@@ -22,7 +17,7 @@
 
 namespace alidade {
 
-// A picture as the map explains it.
+// A picture with its pose in the map.
 struct PosedPicture {
   Matrix3<double> R_base_from_camera = Matrix3<double>::Identity();
   Camera<double> camera;
@@ -36,7 +31,7 @@ struct LandmarkSight {
   Matrix2<double> J_y_u;          // rad/px
   Matrix<double, 2, 4> J_y_pose;  // by (xi, log f)
   Matrix2<double> cov_detection;  // rad^2
-  Matrix2<double> cov_of_pose;    // rad^2: the pose's part of eq. 8
+  Matrix2<double> cov_of_pose;    // rad^2; the pose's part of eq. 8
 };
 
 [[nodiscard]] inline ProjectionStatus see_landmark(const PosedPicture& picture,
@@ -51,7 +46,7 @@ struct LandmarkSight {
   if (!std::isnormal(determinant)) return ProjectionStatus::kBeyondDistortionLimit;
   const Matrix2<double> G = J_u_tangent.inverse();
   out->y = G * (u - p.u);
-  // An error of the row moves the moment at which the landmark is projected.
+  // An error of the row moves the time at which the landmark is projected.
   Matrix2<double> J_r_u = Matrix2<double>::Identity();
   J_r_u.col(1) -= p.J_u_row;
   out->J_y_u = G * J_r_u;
@@ -67,7 +62,7 @@ struct LandmarkSight {
   return sight.cov_of_pose + sight.cov_detection + covariance;
 }
 
-// The symmetric root of a symmetric, positive semidefinite matrix (Cayley, Hamilton).
+// The symmetric root of a symmetric, positive semidefinite matrix (by Cayley-Hamilton).
 [[nodiscard]] inline Matrix2<double> root_of(const Matrix2<double>& m) {
   const double s = std::sqrt(std::max(0.0, m.determinant()));
   const double t = std::sqrt(std::max(0.0, m.trace() + 2 * s));
@@ -83,12 +78,14 @@ struct LandmarkState {
 
 enum class LandmarkUpdate {
   kOk,
-  kBeyondGate,  // further off than the gate: another thing, or a mistake; nothing is changed
-  kSingular,    // nothing is uncertain; nothing is changed
+  kBeyondGate,  // innovation beyond the gate: another thing, or a mistake; nothing is changed
+  kSingular,    // no uncertainty at all; nothing is changed
 };
 
-// common: Cp. share_of_landmarks: which part of the pose's covariance comes from the landmarks' own errors, 0 to 1: S is so much of it.
-// news: above 0, to 1: which part of what this picture says was not said by the ones before it. Errors of a feature last while the light does.
+// common: Cp. share_of_landmarks: share of the pose's covariance that comes from the landmarks' own
+// errors, 0 to 1; S is that share of it. news: > 0 to 1; share of what this picture shows that
+// earlier ones did not. A feature's error lasts as long as the light does, so the picture's
+// covariances are divided by news.
 [[nodiscard]] inline LandmarkUpdate update_landmark(const LandmarkSight& sight,
                                                     const Matrix2<double>& common,
                                                     double share_of_landmarks, double news,
@@ -101,7 +98,7 @@ enum class LandmarkUpdate {
   const Matrix2<double> of_picture = (sight.cov_detection + sight.cov_of_pose) / news;
   const Matrix2<double> K = state->covariance * (of_picture + state->covariance).inverse();
   const Matrix2<double> rest = Matrix2<double>::Identity() - K;
-  // Joseph's form: stays positive whatever is rounded.
+  // Joseph form: stays positive under rounding.
   const Matrix2<double> own =
       rest * state->covariance * rest.transpose() + K * of_picture * K.transpose();
   const bool is_known_better = common.trace() <= state->shared_covariance.trace();
@@ -110,7 +107,8 @@ enum class LandmarkUpdate {
       is_known_better ? root : Matrix2<double>(rest * root + K * root_of(common));
   const Matrix2<double> shared =
       M * M.transpose() + K.trace() / 2 * share_of_landmarks * sight.cov_of_pose;
-  // The step is far smaller than what the basis turns by, except where it jumps: the covariances are told anew there.
+  // A step is far smaller than the basis turns by, except where the basis jumps: the covariances
+  // are turned into the new basis.
   const Matrix<double, 3, 2> before = tangent_basis(state->d_b);
   state->d_b = direction_plus<double>(state->d_b, K * sight.y).normalized();
   const Matrix2<double> turn = tangent_basis(state->d_b).transpose() * before;

@@ -1,12 +1,12 @@
 #pragma once
-// LensCurve: a lens over its range of focal lengths, about what is thought of it beforehand.
-//   s        position: log f (f in px) as the zoom reading has it by a data sheet, or by an earlier calibration
-//   x(s)     = (delta, kappa, c_u, c_v), a cubic B-spline over s
-//   log f    = s + delta(s) + eps,  eps how the lens came to rest in that very picture
-//   k        = kappa (f / R)^2 exp(2 (hold - 1) eps),  R half the image's diagonal, px: kappa is the distortion in the corner
-//              (core/model/zoom_curve.h). A lens that rests off its curve keeps it (hold = 1), or keeps k (hold = 0), or lies between.
-//   c        the optical centre from the image's middle, px
-// Beyond its ends x goes on as it is at the end. Linear in its control points. The constructor allocates.
+// LensCurve: a lens over its range of focal lengths, with s = log f (px) by the zoom reading, from
+// a data sheet or an earlier calibration. x(s) = (delta, kappa, c_u, c_v) is a cubic B-spline.
+//   log f = s + delta(s) + eps                        eps: how the lens came to rest this time
+//   k = kappa (f / R)^2 exp(2 (hold - 1) eps)   R: half the image's diagonal, px
+//   c: optical centre from the image's middle, px
+// kappa is the distortion in the corner (core/model/zoom_curve.h). With eps, hold = 1 keeps kappa,
+// hold = 0 keeps k. Beyond the ends x is constant. Linear in the control points. The constructor
+// allocates.
 
 #include <algorithm>
 #include <cmath>
@@ -29,7 +29,8 @@ class LensCurve : public CubicSpline<kLensQuantityCount, LensCurve> {
 
   LensCurve() = default;
 
-  // Over log f from first to last, in segments of at most `spacing`; the same at all of them: that of `camera` but for its f.
+  // Over log f from first to last, in segments of at most `spacing`. All points are those of
+  // `camera`, apart from its f.
   LensCurve(const Camera<double>& camera, double first, double last, double spacing)
       : CubicSpline(even_knots(first, last, spacing)),
         width_(camera.width),
@@ -41,11 +42,12 @@ class LensCurve : public CubicSpline<kLensQuantityCount, LensCurve> {
     for (int i = 0; i < control_points(); ++i) control_point(i) = x;
   }
 
-  // All quantities 0, to be filled in: of knots and control points that were kept. Two knots or more, increasing.
+  // All quantities 0, to be filled in: for stored knots and control points. Two knots or more,
+  // increasing.
   LensCurve(int width, int height, double aspect, const std::vector<double>& knots)
       : CubicSpline(knots), width_(width), height_(height), aspect_(aspect) {}
 
-  // Of one lens that does not zoom; f may be another nevertheless.
+  // A lens that does not zoom; f may differ nevertheless.
   [[nodiscard]] static LensCurve of(const Camera<double>& camera) {
     const double log_f = std::log(camera.focal_length);
     return {camera, log_f - 0.01, log_f + 0.01, 1};
@@ -58,10 +60,11 @@ class LensCurve : public CubicSpline<kLensQuantityCount, LensCurve> {
   [[nodiscard]] double& hold() { return hold_; }
   [[nodiscard]] double hold() const { return hold_; }
 
-  // The weights at s, held to the curve's range.
+  // Weights at s, clamped to the curve's range.
   [[nodiscard]] Basis basis_at(double s) const { return basis(std::clamp(s, begin_s(), end_s())); }
 
-  // Of this lens's shape alone. J_*: d (f, alpha, k, c_u, c_v) / d x, / d eps, / d hold.
+  // The camera for given quantities; uses only this lens's shape. J_*: d (f, alpha, k, c_u,
+  // c_v) / d x, / d eps, / d hold.
   struct Jacobians {
     Matrix<double, kCameraParameterCount, kLensQuantityCount> J_x;
     CameraColumn J_eps;
@@ -93,9 +96,10 @@ class LensCurve : public CubicSpline<kLensQuantityCount, LensCurve> {
     return camera(s, value(basis_at(s)), eps, hold_);
   }
 
-  // The lens of a focal length, whatever reading belongs to it. J_camera_log: d (f, alpha, k, c_u, c_v) / d log f.
+  // The camera of a focal length, whatever its zoom reading. J_camera_log: d (f, alpha, k, c_u,
+  // c_v) / d log f.
   [[nodiscard]] Camera<double> camera_of(double log_f, CameraColumn* J_camera_log = nullptr) const {
-    // A contraction: delta changes slowly.
+    // Fixed-point iteration; converges as delta changes slowly.
     double s = log_f;
     for (int step = 0; step < 30; ++step) {
       const double before = s;

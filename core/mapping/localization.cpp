@@ -13,10 +13,11 @@ namespace {
 
 constexpr double kLogFMargin = 0.1;  // beyond the lens's range
 
-// Of a place on the image, by the feature's size, px: as it comes out of maps; what a picture has more of is found from it.
+// px; sigma of a feature's place by its size, as found when maps are made. A picture with more
+// noise shows it in its residuals.
 double place_sigma_px(double scale_px) { return std::max(0.15, 0.06 * scale_px); }
 
-// Where a direction is seen, at the row that it is seen in. False: nowhere.
+// Where a direction is seen, in its own row. False: nowhere.
 bool seen_at(const Camera<double>& camera, const PictureMotion& motion,
              const Matrix3<double>& R_base_from_camera, const Vector3<double>& d_b,
              Vector2<double>* u) {
@@ -88,7 +89,7 @@ struct Localizer::State {
     return landmarks[static_cast<std::size_t>(i)];
   }
 
-  // Two that are one thing, seen at several zooms and not recognised as such.
+  // Whether two landmarks are one thing, seen at several zooms and not recognised as the same.
   [[nodiscard]] bool is_same(int a, int b) const {
     const Landmark& la = landmark(a);
     const Landmark& lb = landmark(b);
@@ -104,7 +105,7 @@ struct Localizer::State {
     return m;
   }
 
-  // Features against these landmarks.
+  // Matches of features with these landmarks.
   [[nodiscard]] std::vector<FeatureMatch> match(const FeatureSet& features,
                                                 const std::vector<int>& among) const {
     std::vector<Descriptor> indexed;
@@ -128,7 +129,7 @@ struct Localizer::State {
     return out;
   }
 
-  // Landmarks that should be seen from there, in the size of a feature, each where.
+  // Landmarks that should be seen from a place, at a size that features have, and where.
   struct Visible {
     int landmark = 0;
     Vector2<double> u;
@@ -158,7 +159,7 @@ struct Localizer::State {
     return out;
   }
 
-  // Features against the landmarks that should lie within `radius_px` of them.
+  // Matches of features with the landmarks predicted within `radius_px`.
   [[nodiscard]] std::vector<FeatureMatch> match_near(const FeatureSet& features,
                                                      std::vector<Visible> there,
                                                      double radius_px) const {
@@ -188,7 +189,7 @@ struct Localizer::State {
         if (n.indexed >= 0) n.indexed = which[static_cast<std::size_t>(n.indexed)];
       }
       if (near[i][0].square > most) near[i] = {};
-      // Where nothing else is near, what is too unlike stands for it.
+      // If nothing else is near, a descriptor that is too unlike takes the second place.
       for (NearFeature& n : near[i]) {
         if (near[i][0].indexed >= 0 && n.indexed < 0) {
           n = {static_cast<int>(landmarks.size()), 2 * most};
@@ -215,7 +216,7 @@ struct Localizer::State {
     return out;
   }
 
-  // Again with all landmarks about the places that a first pose gives them.
+  // Localizes again with all landmarks around the places that the first pose predicts.
   [[nodiscard]] bool refine(const FeatureSet& features, PoseKnowledge knowledge,
                             Localization* out) const {
     const Place place{out->pose.R_base_from_camera, out->pose.log_f};
@@ -252,8 +253,9 @@ struct Localizer::State {
     return true;
   }
 
-  // The keyframe of the nearest focal length rests on the same lens and the same base: what it does not know of both, no picture
-  // knows. An error of the optical centre, say, is one of the rotation in the camera's own frame.
+  // The keyframe of the nearest focal length shares lens and base with the picture, so its
+  // uncertainty in both is the picture's too. An error of the optical centre, for one, is a
+  // rotation in the camera's own frame.
   void add_common_error(Localization* out) const {
     const auto off = [&](const Keyframe& k) { return std::abs(k.place.log_f - out->pose.log_f); };
     const auto nearest =
@@ -292,7 +294,7 @@ struct Localizer::State {
     return out;
   }
 
-  // Indices of keyframes, the most likely first.
+  // Indices of keyframes, most likely first.
   [[nodiscard]] std::vector<int> retrieved(const FeatureSet& features) const {
     const std::size_t asking =
         std::min(static_cast<std::size_t>(options.asking_features), features.size());

@@ -24,11 +24,11 @@ using internal::LensLevelCost;
 using internal::PicturePriorCost;
 using internal::SeenCost;
 
-constexpr double kBend_sigmas = 2.5;  // where Huber's loss goes over to a line
-constexpr double kKeptOrientation_rad =
-    1e-7;  // of the first picture, where nothing else says which way is which
+constexpr double kBend_sigmas = 2.5;  // where Huber's loss becomes linear
+// Of the first picture, if nothing else fixes the base.
+constexpr double kKeptOrientation_rad = 1e-7;
 
-// All that changes; the blocks of the problem lie in it.
+// The unknowns; the problem's parameter blocks point into it.
 struct MapState {
   std::vector<Vector4<double>> pictures;  // xi, eps
   std::vector<Vector3<double>> d_start;
@@ -66,9 +66,9 @@ bool is_usable(const MapEvidence& evidence, const MapOptions& options) {
       });
 }
 
-// Directions that the start values give: of each landmark the mean of those that most agree with; of length 0 where there is none.
-// `agrees`: the observations of that mean. What is elsewhere has no part in the adjustment: a landmark between two pictures that
-// look apart may have no pixel in either.
+// Start direction of each landmark: the mean of the largest set of its observations that agree; of
+// length 0 if there is none. agrees: the observations in these means. Others take no part in the
+// adjustment, as a landmark between two pictures that look apart may have no pixel in either.
 std::vector<Vector3<double>> start_directions(const MapEvidence& evidence, const LensCurve& lens,
                                               double most_start_error, std::vector<bool>* agrees) {
   std::vector<Vector3<double>> seen_at;
@@ -104,7 +104,7 @@ std::vector<Vector3<double>> start_directions(const MapEvidence& evidence, const
   return out;
 }
 
-// Observations of landmarks that two pictures or more see.
+// The used observations, of landmarks that two pictures or more see.
 std::vector<bool> tied(const MapEvidence& evidence, const MapState& state, std::vector<bool> used) {
   std::vector<int> count(state.d_start.size(), 0);
   for (std::size_t i = 0; i < used.size(); ++i) {
@@ -117,7 +117,7 @@ std::vector<bool> tied(const MapEvidence& evidence, const MapState& state, std::
   return used;
 }
 
-// The problem and its blocks in the order in which they are eliminated.
+// The problem and its parameter blocks, in the order of elimination.
 struct MapProblem {
   ceres::Problem problem;
   std::vector<double*> landmarks;
@@ -188,14 +188,15 @@ std::unique_ptr<MapProblem> build_problem(const MapEvidence& evidence, const Map
   return out;
 }
 
-// least_gain: of the cost, relative, below which a step is the last.
+// least_gain: relative decrease of the cost below which the solver stops.
 bool solve(const MapOptions& options, double least_gain, MapProblem* map, bool* converged,
            int* steps) {
   ceres::Solver::Options solver;
   solver.linear_solver_type = ceres::SPARSE_SCHUR;
   auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
   for (double* block : map->landmarks) ordering->AddElementToGroup(block, 0);
-  // Within a group the order is that of addresses: control points and hold have one each, so that it is the same each time.
+  // Within a group Ceres orders by address. So control points and hold have groups of their own, to
+  // be the same each time.
   for (std::size_t i = 0; i + 1 < map->shared.size(); ++i) {
     ordering->AddElementToGroup(map->shared[i], i < map->pictures ? 1 : 2);
   }
@@ -204,7 +205,7 @@ bool solve(const MapOptions& options, double least_gain, MapProblem* map, bool* 
   solver.max_num_iterations = options.max_steps;
   solver.num_threads = std::max(1, options.threads);
   solver.function_tolerance = least_gain;
-  // Angles of 1e-7 rad matter beside centres of some pixels.
+  // Angles of 1e-7 rad matter, beside centres of some pixels.
   solver.parameter_tolerance = 0;
   solver.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
@@ -214,7 +215,7 @@ bool solve(const MapOptions& options, double least_gain, MapProblem* map, bool* 
   return summary.IsSolutionUsable();
 }
 
-// Of each observation, in its sigmas; infinite where the state has no pixel for it.
+// Squared residual of each observation in its sigmas; infinite if the state does not project it.
 std::vector<double> squares_of(const MapEvidence& evidence, const MapOptions& options,
                                const MapState& state) {
   std::vector<double> out;
@@ -242,7 +243,8 @@ std::vector<double> squares_of(const MapEvidence& evidence, const MapOptions& op
   return out;
 }
 
-// How much larger residuals are than claimed, 1 at least: by their median, with what the unknowns take of them allowed for.
+// How much larger residuals are than claimed, at least 1: from their median, corrected for the
+// unknowns' share.
 double noise_found(const std::vector<double>& squares, const std::vector<bool>& used,
                    std::size_t unknowns) {
   std::vector<double> of_used;
@@ -254,11 +256,12 @@ double noise_found(const std::vector<double>& squares, const std::vector<bool>& 
   std::nth_element(of_used.begin(), middle, of_used.end());
   const double rows = 2 * static_cast<double>(of_used.size());
   const double free = std::max(0.1, (rows - static_cast<double>(unknowns)) / rows);
-  const double median_of_two = 2 * std::log(2.0);  // of chi-square with two degrees of freedom
+  const double median_of_two = 2 * std::log(2.0);  // of a chi-square with two degrees of freedom
   return std::max(1.0, std::sqrt(*middle / (median_of_two * free)));
 }
 
-// The covariance of what is shared, and the residuals' scale, by the reduced normal matrix; false if it is singular.
+// Covariance of the shared unknowns by the reduced normal matrix, and the residuals' scale. False
+// if it is singular.
 bool shared_covariance(MapProblem* map, Eigen::MatrixXd* covariance, double* noise_scale) {
   ceres::Problem::EvaluateOptions evaluate;
   evaluate.parameter_blocks = map->landmarks;
@@ -282,7 +285,7 @@ bool shared_covariance(MapProblem* map, Eigen::MatrixXd* covariance, double* noi
   const SparseColumns BB = B.transpose() * B;
   Eigen::MatrixXd S = BB;
   S -= SparseColumns(AB.transpose() * eliminated_by);
-  // Columns of one length: unknowns are of very different units.
+  // Columns are scaled to one length, as the units differ widely.
   const Eigen::VectorXd scale =
       Eigen::VectorXd(BB.diagonal()).cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
   const Eigen::MatrixXd scaled = scale.asDiagonal() * S * scale.asDiagonal();
@@ -304,7 +307,8 @@ bool shared_covariance(MapProblem* map, Eigen::MatrixXd* covariance, double* noi
   return covariance->allFinite() && std::isfinite(*noise_scale);
 }
 
-// (xi, log f) of the pictures by what is shared. That xi is of R_start Exp(xi), the one given of R Exp(xi).
+// Derivative of the pictures' (xi, log f) by the shared unknowns. There xi is of R_start Exp(xi),
+// here of R Exp(xi).
 Eigen::SparseMatrix<double> pictures_by_shared(const MapEvidence& evidence, const MapState& state) {
   const auto pictures = static_cast<Eigen::Index>(evidence.pictures.size());
   std::vector<Eigen::Triplet<double>> entries;
@@ -398,7 +402,8 @@ MapAdjustment adjust_map(const MapEvidence& evidence, const MapOptions& options)
   };
   double noise = 1;
   bool converged = false;
-  // What is wrong pulls at the first and makes it creep in the end: it need not arrive, nor can its gate be tight.
+  // Outliers pull at the first rounds, which then converge slowly: these stop early and have a
+  // wider gate.
   struct Round {
     double least_gain, gate;
   };
@@ -420,7 +425,8 @@ MapAdjustment adjust_map(const MapEvidence& evidence, const MapOptions& options)
   if (!hangs_together()) return out;
   const auto map = build_problem(evidence, options, used, noise, &state);
   out.status = MapStatus::kNotDetermined;
-  // What is still to gain then is far below one sigma: observations that the loss bends creep for long.
+  // What is left to gain is far below one sigma. Observations beyond the loss's bend converge
+  // slowly.
   if (!solve(options, 1e-6, map.get(), &converged, &out.steps)) return out;
   Eigen::MatrixXd covariance;
   if (!shared_covariance(map.get(), &covariance, &out.noise_scale)) return out;

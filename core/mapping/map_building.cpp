@@ -13,7 +13,7 @@
 namespace alidade {
 namespace {
 
-// Of a common focal length that was looked for in steps.
+// Sigma of log f if a common focal length was searched in steps.
 constexpr double kSearchedLogSigma = 0.15;
 
 class Building {
@@ -152,7 +152,7 @@ class Building {
     }
   }
 
-  // Leaves the largest of groups (of indices of kept_), if the others are small.
+  // Keeps the largest group (indices into kept_) if the others are small.
   bool keep_largest(const std::vector<std::vector<int>>& groups) {
     const bool all_but_one_small =
         groups.size() < 2 || static_cast<int>(groups[1].size()) < options_.least_group;
@@ -194,7 +194,7 @@ class Building {
     return keep_largest(connected_pictures(static_cast<int>(kept_.size()), seen, 1));
   }
 
-  // Matches whose directions agree, with what was adjusted.
+  // Matches whose directions agree after an adjustment.
   void add_agreeing(const PictureLink& link, int a, int b, std::vector<TrackMatch>* out) const {
     const auto at_a = static_cast<std::size_t>(a);
     const auto at_b = static_cast<std::size_t>(b);
@@ -221,7 +221,8 @@ class Building {
     }
   }
 
-  // Of kept pictures. Once adjusted: of all matches that agree with it; before: of the links' inliers.
+  // Tracks of kept pictures. adjusted: from all matches that agree with the adjustment; otherwise
+  // from the links' inliers.
   [[nodiscard]] std::vector<std::vector<PictureFeature>> tracks(bool adjusted) const {
     std::vector<int> place(pictures_.size(), -1);
     std::vector<int> counts;
@@ -246,7 +247,7 @@ class Building {
     return feature_tracks(counts, std::move(matches));
   }
 
-  // The longest, until each picture has `most` of them; 0: all.
+  // Keeps the longest tracks until each picture has `most` of them; 0: all.
   void thin(int most, std::vector<std::vector<PictureFeature>>* all) const {
     if (most == 0) return;
     std::stable_sort(all->begin(), all->end(),
@@ -338,7 +339,7 @@ class Building {
       for (const PictureFeature& f : tracks_[j]) {
         const auto& error = errors[i++];
         const int n = seen_by[j];
-        // Of n observations the landmark takes one.
+        // The landmark absorbs one of n observations.
         if (error && n > 1) {
           scale_and_error.emplace_back(feature(f).scale, *error * std::sqrt(n / (n - 1.0)));
         }
@@ -352,9 +353,9 @@ class Building {
   const MapProgress& progress_;
   std::vector<LinkedPicture> pictures_;
   std::vector<PictureLink> links_;
-  bool searched_ = false;  // for a common focal length
-  LensCurve lens_;         // to begin with
-  // Indices of pictures, and their orientations to begin with; what is adjusted counts these.
+  bool searched_ = false;  // whether a common focal length was searched
+  LensCurve lens_;         // start value
+  // Indices of pictures and their start orientations. The adjustment counts these.
   std::vector<int> kept_;
   std::vector<Matrix3<double>> R_;
   PlaceNoise noise_;

@@ -1,13 +1,11 @@
 #pragma once
-// From pictures to a scene map: what is one thing in many pictures, start values, adjustment, and all that can be recognised later.
-//   links      twos of pictures, compared and checked (picture_links.h)
-//   first      adjustment on some features of each, the lens from what is thought of it (map_adjustment.h)
-//   second     with the lens found: matches checked again, each within some sigmas of where it should be; their noise by the size of a
-//              feature, learnt; adjustment on all
-//   landmarks  tracks of two features or more, and what one picture alone has seen, with covariance: its own part from its
-//              observations, the common one from the keyframe that knows its direction best
-// Pictures without telemetry are tied to the others by what they see; without any telemetry the base is that of one picture, which
-// looks forward. What does not hang together with the rest is named: little of it is left out, more is refused.
+// MapBuilder: builds a scene map from pictures' features and what is known of the pictures. In
+// order: links between pairs of pictures (picture_links.h), a first adjustment with some features
+// and the prior lens (map_adjustment.h), a second one with all features, landmarks (map_making.h).
+// Details: docs/derivations.md.
+// Pictures without telemetry are tied to the others by common features. Without any telemetry the
+// base is that of one picture, which looks forward. Parts that do not connect to the rest are
+// named: small ones are left out, larger ones refused.
 // Batch work: allocates much. Equal input gives equal maps. No threads of its own.
 
 #include <cstdint>
@@ -22,82 +20,85 @@
 
 namespace alidade {
 
-// What is known of a picture, besides its features.
+// Knowledge of a picture besides its features.
 struct MapView {
   std::string recording;
   std::int64_t frame = 0;
   double time_utc_s = 0;
   std::optional<double> zoom;
-  std::optional<double>
-      log_f;  // by zoom reading and data sheet or calibration; all pictures or none
+  // From zoom reading and data sheet or calibration; all pictures have it or none.
+  std::optional<double> log_f;
   std::optional<PanTilt<double>> telemetry;  // measured angles
-  double angle_sigma =
-      1e-3;  // rad, of telemetry's orientation: noise, backlash, and what is not known of the axes
+  // rad, of telemetry's orientation: noise, backlash, uncertainty of the axes.
+  double angle_sigma = 1e-3;
   Vector3<double> angular_velocity = Vector3<double>::Zero();  // camera frame, rad/s
   double zoom_rate = 0;                                        // d log f / dt, 1/s
 };
 
 struct MapBuildOptions {
-  int width = 0;  // of all pictures, px
+  int width = 0;  // px, of all pictures
   int height = 0;
   double line_delay = 0;  // s/row
   std::optional<Mechanics<double>> mechanics;
-  std::optional<LensCurve> lens;  // of an earlier calibration; its range has to hold all log_f
-  double log_f_sigma =
-      0.02;  // of log_f: what the data sheet may be wrong by at a picture, while nothing is known
+  std::optional<LensCurve> lens;  // of an earlier calibration; its range must contain all log_f
+  // Of log_f: error of the data sheet at a picture before the adjustment.
+  double log_f_sigma = 0.02;
   double repeatability = 1e-3;  // sigma of log f after a movement of the zoom
-  double lens_spacing = 0.4;    // of log f: knots of the lens's curve
-  double centre_share = 0.01;  // of the width: sigma of the optical centre about the image's middle
+  double lens_spacing = 0.4;    // of log f, between knots of the lens's curve
+  // Sigma of the optical centre about the image's middle, as a share of the width.
+  double centre_share = 0.01;
   LinkOptions links;
-  MapOptions adjustment;     // its lens is set here
+  MapOptions adjustment;     // its lens is set by the builder
   int first_features = 150;  // of each picture, for the first adjustment
-  double gate_px = 1.5;      // of the second, and
+  // Second adjustment: matches must agree within gate_px or gate_sigmas, whichever is larger.
+  double gate_px = 1.5;
   double gate_sigmas = 6;
-  int least_features = 30;  // of a picture that can be used
-  int least_group =
-      3;  // pictures of a part that does not hang together with the rest, at which the map is refused
-  bool largest_part = false;  // take the largest part nevertheless
+  int least_features = 30;  // of a usable picture
+  // The map is refused if an unconnected part has so many pictures.
+  int least_group = 3;
+  bool largest_part = false;  // use the largest part even then
 
   [[nodiscard]] bool validate(const char** error = nullptr) const;
 };
 
 enum class MapBuildStatus {
   kOk,
-  kBadInput,       // options, or nothing to begin with
-  kNoTexture,      // no two pictures with enough features
-  kNoFocalLength,  // some pictures have log_f and some not, or none fits
-  kNotConnected,   // see groups
+  kBadInput,       // options, or too few pictures
+  kNoTexture,      // fewer than two pictures with enough features
+  kNoFocalLength,  // only some pictures have log_f, or none fits
+  kNotConnected,   // see MapBuild::groups
   kNotDetermined,  // the adjustment found no minimum
 };
 
 [[nodiscard]] const char* to_string(MapBuildStatus status);
 
 struct MapBuild {
+  // Filled with kOk.
   MapBuildStatus status = MapBuildStatus::kBadInput;
-  SceneMap map;                          // with kOk
-  std::vector<int> of_keyframe;          // which picture, as added from 0, each keyframe was
+  SceneMap map;
+  std::vector<int> of_keyframe;          // index of each keyframe's picture, in the order of add()
   std::vector<int> without_texture;      // left out
   std::vector<int> not_connected;        // left out
-  std::vector<std::vector<int>> groups;  // with kNotConnected: the largest first
+  std::vector<std::vector<int>> groups;  // with kNotConnected; the largest first
   MapStatus adjustment = MapStatus::kOk;
-  int compared = 0;  // twos of pictures
+  int compared = 0;  // pairs of pictures
   int linked = 0;
   int tracks = 0;
-  int observations = 0;    // that the map rests on
-  double residual_px = 0;  // root mean square of an observation's error
-  double noise_scale = 0;  // residuals over what was claimed
+  int observations = 0;    // used by the map
+  double residual_px = 0;  // rms of an observation's error
+  double noise_scale = 0;  // residuals over stated noise
   double hold_sigma = 0;   // of the map's lens
   int steps = 0;
 };
 
-// part done, 0 to 1, and what is being done
+// done: 0 to 1. what: the current step.
 using MapProgress = std::function<void(double done, const char* what)>;
 
 class MapBuilder {
  public:
   explicit MapBuilder(const MapBuildOptions& options) : options_(options) {}
 
-  // picture: coded, as it is to be kept; may be empty.
+  // picture: coded, as the map keeps it; may be empty.
   void add(MapView view, FeatureSet features, std::vector<std::uint8_t> picture = {});
   [[nodiscard]] int size() const { return static_cast<int>(views_.size()); }
   [[nodiscard]] const MapView& view(int i) const { return views_[static_cast<std::size_t>(i)]; }

@@ -10,7 +10,7 @@ bool refuse(const std::string& what, std::string* error) {
   return false;
 }
 
-// Whether what is new may follow: ids increase from `first` on, and each is valid.
+// Whether new parts may be added: ids increase from `first` on, and each part is valid.
 template <class T>
 bool may_follow(const std::vector<T>& parts, std::int64_t first, const char* kind,
                 std::string* error) {

@@ -1,5 +1,6 @@
 #pragma once
-// MapChange: what became of a scene map in one step of its upkeep; stored as one transaction (edge_app/storage/scene_map_file.h).
+// MapChange: one step of a scene map's upkeep; stored as one transaction
+// (edge_app/storage/scene_map_file.h).
 
 #include <cstdint>
 #include <string>
@@ -10,8 +11,8 @@
 namespace alidade {
 
 struct MapChange {
-  std::vector<SceneKeyframe> new_keyframes;  // increasing ids, above all that there are
-  std::vector<SceneLandmark> changed;        // as they are from here on; increasing ids
+  std::vector<SceneKeyframe> new_keyframes;  // increasing ids, above all existing ones
+  std::vector<SceneLandmark> changed;        // in their new state; increasing ids
   std::vector<SceneLandmark> born;           // increasing ids, from the map's next_landmark on
   std::vector<std::int64_t> died;            // increasing; none of `changed`
 
@@ -20,7 +21,8 @@ struct MapChange {
   }
 };
 
-// False, and the map as it was: the change does not fit the map, or something in it is not valid; error says what. One pass over the map.
+// False, with the map unchanged: the change does not fit the map or holds something invalid; error
+// says what. One pass over the map.
 [[nodiscard]] bool apply(const MapChange& change, SceneMap* map, std::string* error);
 
 }  // namespace alidade

@@ -1,6 +1,7 @@
 #pragma once
-// The terms of map_adjustment.h as Ceres' cost functions, with their Jacobians.
-// A picture's block is (xi, eps) with R = R_start Exp(xi); a landmark's the change of its start direction; the lens's are control points, and hold.
+// The terms of map_adjustment.h as Ceres cost functions with Jacobians. Parameter blocks: of a
+// picture (xi, eps) with R = R_start Exp(xi); of a landmark the change of its start direction; of
+// the lens its control points, and hold.
 
 #include <ceres/sized_cost_function.h>
 
@@ -10,12 +11,14 @@ namespace alidade::internal {
 
 inline constexpr int kPictureBlock = 4;
 
-// Parameters: picture, landmark, the four control points that act at the picture's position, hold. Residuals: error over sigma.
+// Parameters: picture, landmark, the four control points at the picture's position, hold. Residual:
+// error over sigma.
 class SeenCost
     : public ceres::SizedCostFunction<2, kPictureBlock, 2, kLensQuantityCount, kLensQuantityCount,
                                       kLensQuantityCount, kLensQuantityCount, 1> {
  public:
-  // All but the observation have to live as long as this; of lens nothing but its shape is used.
+  // All arguments except the observation must outlive this object. Of the lens only its shape is
+  // used.
   SeenCost(const MapPicture* picture, const LensCurve* lens, const Vector3<double>* d_start,
            const MapObservation& seen);
   bool Evaluate(double const* const* parameters, double* residuals,
@@ -30,7 +33,7 @@ class SeenCost
   LensCurve::Basis basis_;
 };
 
-// Telemetry and eps of a picture.
+// Priors of a picture: telemetry and eps.
 class PicturePriorCost : public ceres::SizedCostFunction<4, kPictureBlock> {
  public:
   PicturePriorCost(const Matrix3<double>& R_start, const std::optional<OrientationPrior>& telemetry,

@@ -75,7 +75,7 @@ class MapMaking {
         .features.features[static_cast<std::size_t>(f.feature)];
   }
 
-  // Of the direction that a keyframe gives a pixel, by its pose; in tangent_basis(d_b).
+  // Covariance that a keyframe's pose gives the direction of a pixel, in tangent_basis(d_b).
   [[nodiscard]] Matrix2<double> pose_part(std::size_t at, const Vector2<double>& u,
                                           const Vector3<double>& d_b) const {
     const AdjustedPicture& pose = found_.pictures[at];

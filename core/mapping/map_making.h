@@ -1,9 +1,9 @@
 #pragma once
-// What an adjustment of pictures becomes as a scene map: its keyframes, and all that can be recognised later, with covariances.
-//   landmark    a track of two observations or more that the adjustment kept, or a feature that one picture alone has seen
-//   covariance  its own part from its observations, in tangent_basis(d_b); the shared one of the pose and the focal length of the
-//               keyframe that knows its direction best
-// Base frame, rad and px. Batch work: allocates.
+// make_scene_map(): turns an adjustment into a scene map: its keyframes, and landmarks with
+// covariances. A landmark is a track with two or more observations that the adjustment kept, or a
+// feature that only one picture has seen. Its own covariance comes from its observations, in
+// tangent_basis(d_b). The common one comes from pose and f of the keyframe that knows its direction
+// best. Base frame, rad and px. Batch work: allocates.
 
 #include <optional>
 #include <vector>
@@ -14,7 +14,8 @@
 
 namespace alidade {
 
-// Pictures count as in found; observations of evidence are the features of tracks, one after another.
+// Pictures are indexed as in found. The observations of evidence are the features of the tracks, in
+// sequence.
 struct MapMaterial {
   const MapBuildOptions& options;
   const MapAdjustment& found;
@@ -25,11 +26,11 @@ struct MapMaterial {
   std::vector<const LinkedPicture*> pictures;
 };
 
-// The norm of what is left of each observation, px; none: it was left out.
+// Norm of each observation's residual, px; nothing if it was left out.
 [[nodiscard]] std::vector<std::optional<double>> errors_px(const MapEvidence& evidence,
                                                            const MapAdjustment& found);
 
-// Fills in the map, and how many tracks and observations it rests on.
+// Fills in the map, the numbers of its tracks and observations, and its residuals.
 void make_scene_map(const MapMaterial& material, MapBuild* out);
 
 }  // namespace alidade

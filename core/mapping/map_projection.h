@@ -1,11 +1,11 @@
 #pragma once
-// Where a direction of the map is seen in one picture: written once, for localization and adjustment.
-//   u = project(camera at row v, M(v)^T R^T d),   R = R_base_from_camera when the reference row is exposed
-//   M(v) = Exp(w t), t = (v - reference row) * line delay,   camera at row v: log f more by zoom_rate t, the corner's distortion as it is
-// w is the camera's turn rate in its own frame, constant over a picture. The angles' rates are what is constant (rolling_shutter.h);
-// the difference is second order in the turn during one read-out. v is the row that was measured: errors of it move t, see
-// reprojection_error_covariance() of rolling_shutter.h. A picture tells rates times line delay only: with a line delay of 1 / height they
-// are what the camera does over the image's height (in_heights()). No allocation.
+// Where one picture sees a direction of the map, for localization and adjustment. No allocation.
+//   u = project(camera at row v, M(v)^T R^T d),   R = R_base_from_camera at the reference row
+//   M(v) = Exp(w t), t = (v - reference row) * line delay;   log f at row v grows by zoom_rate t
+// The corner's distortion stays while f changes. w is the camera's turn rate in its own frame,
+// constant over a picture (constant rates of the angles, as in rolling_shutter.h, differ in second
+// order). v is the measured row; its error moves t: see reprojection_error_covariance() there. A
+// picture shows only rates times line delay: in_heights() gives the motion per image height.
 
 #include "core/model/camera.h"
 #include "core/model/rolling_shutter.h"
@@ -22,7 +22,7 @@ struct PictureMotion {
   [[nodiscard]] double time_of_row(double v) const { return (v - reference_row) * line_delay; }
 };
 
-// The same with the time of an image's height for a second. What a line delay of 0 says of rates is nothing.
+// The same with the time of one image height as the unit. A line delay of 0 gives rates of 0.
 [[nodiscard]] inline PictureMotion in_heights(const PictureMotion& motion, int height) {
   const double read_out = motion.line_delay * height;
   return {motion.angular_velocity * read_out, motion.zoom_rate * read_out, 1.0 / height,
@@ -31,11 +31,11 @@ struct PictureMotion {
 
 struct MapProjection {
   Vector2<double> u;                                    // px
-  Vector2<double> J_u_row;                              // the image's motion per row
-  Matrix<double, 2, 3> J_u_xi;                          // of R Exp(xi)
-  Matrix<double, 2, 3> J_u_d;                           // of d in base
-  Matrix<double, 2, kCameraParameterCount> J_u_camera;  // of the camera at the reference row
-  Matrix<double, 2, 4> J_u_motion;                      // of w, zoom rate
+  Vector2<double> J_u_row;                              // motion of the image per row
+  Matrix<double, 2, 3> J_u_xi;                          // by xi of R Exp(xi)
+  Matrix<double, 2, 3> J_u_d;                           // by d in base
+  Matrix<double, 2, kCameraParameterCount> J_u_camera;  // by the camera at the reference row
+  Matrix<double, 2, 4> J_u_motion;                      // by w and zoom rate
 };
 
 [[nodiscard]] inline ProjectionStatus project_from_map(const Camera<double>& camera,
@@ -69,7 +69,7 @@ struct MapProjection {
   return ProjectionStatus::kOk;
 }
 
-// The pixel alone.
+// The pixel only.
 [[nodiscard]] inline ProjectionStatus pixel_from_map(const Camera<double>& camera,
                                                      const PictureMotion& motion,
                                                      const Matrix3<double>& R_base_from_camera,

@@ -13,7 +13,7 @@ namespace {
 constexpr double kSecondsADay = 86400;
 constexpr double kLeastNews = 1e-6;
 constexpr double kFinestScale_px = 1.6;
-// Counts are halved here: what was long ago says little of today.
+// At this count both counts are halved: old looks say little of today.
 constexpr std::uint32_t kMostLooks = 200;
 
 std::uint64_t mixed(std::uint64_t x) {
@@ -44,7 +44,7 @@ void count_look(bool found, double now_utc_s, LandmarkLife* life) {
   life->last_seen_utc_s = now_utc_s;
 }
 
-// What is found of it when it is looked for, with two looks of one in two beforehand.
+// Share of looks that found it, with a prior of one found in two.
 double usual_share(const LandmarkLife& life) {
   return (life.matched + 1.0) / (life.looked_for + 2.0);
 }
@@ -167,7 +167,8 @@ bool LandmarkUpkeep::look(const UpkeepView& view, const SceneMap& map, Picture* 
     const Matrix<double, 2, 4> weighted = information * sight.J_y_pose;
     of_all += sight.J_y_pose.transpose() * weighted;
     of_landmarks += weighted.transpose() * landmark.covariance * weighted;
-    // Along the direction itself it has no error: filled up, so that the mean over a wide view is not too small.
+    // The error has no part along the direction itself. That is filled up, else the mean over a
+    // wide view would be too small.
     const Matrix<double, 3, 2> basis = tangent_basis(landmark.d_b);
     picture->common +=
         basis * landmark.shared_covariance * basis.transpose() +
@@ -182,7 +183,7 @@ bool LandmarkUpkeep::look(const UpkeepView& view, const SceneMap& map, Picture* 
   const double theirs = (of_landmarks * view.covariance).trace();
   picture->share_of_landmarks = all > 0 ? std::clamp(theirs / all, 0.0, 1.0) : 1;
 
-  // Everything within the circle about the image.
+  // All landmarks within the circle around the image.
   const Camera<double>& camera = posed.camera;
   const double radius = std::atan(std::hypot(camera.width, camera.height) / camera.focal_length);
   const double least_cosine = std::cos(std::min(kPi / 2, radius));
@@ -255,7 +256,8 @@ void LandmarkUpkeep::judge(const UpkeepView& view, const SceneMap& map, Picture*
   for (const Picture::Visible& visible : picture->visible) {
     if (!visible.expected) continue;
     ++counts->expected;
-    // What was missing the last time, or not seen for long, says nothing of fog: else what is gone would hide its own death.
+    // Landmarks missed the last time or not seen for long say nothing of fog: else what is gone
+    // would hide its own death.
     const LandmarkLife& life = map.landmarks[visible.index].life;
     if (life.missed > 0 || view.time_utc_s - life.last_seen_utc_s > options_.longest_fog_s)
       continue;

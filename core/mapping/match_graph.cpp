@@ -9,7 +9,7 @@
 namespace alidade {
 namespace {
 
-// A forest in which each tree is a group.
+// A forest; each tree is a group.
 class PictureGroups {
  public:
   explicit PictureGroups(int pictures) : parent_(static_cast<std::size_t>(pictures)) {
@@ -41,7 +41,7 @@ std::vector<std::vector<int>> connected_pictures(int pictures, std::vector<SeenI
   std::sort(seen.begin(), seen.end(), by_landmark);
   seen.erase(std::unique(seen.begin(), seen.end()), seen.end());
 
-  // Each landmark gives one pair for any two pictures that see it.
+  // One pair for each landmark and any two pictures that see it.
   std::vector<std::pair<int, int>> pairs;
   for (std::size_t first = 0; first < seen.size();) {
     std::size_t last = first;

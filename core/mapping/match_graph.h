@@ -1,16 +1,17 @@
 #pragma once
-// Which pictures hang together by what they see in common. Pure.
+// Which pictures are connected by landmarks in common. Pure.
 
 #include <utility>
 #include <vector>
 
 namespace alidade {
 
-// Which picture sees which landmark; both counted from 0.
+// Indices of a picture and of a landmark that it sees.
 using SeenIn = std::pair<int, int>;
 
-// Groups of pictures of which each shares `least_common` landmarks or more with another one of its group; the largest first, within
-// each in increasing order. A picture that shares with none is a group of its own. Pictures outside 0 to `pictures` are left out.
+// Groups of pictures: each shares `least_common` landmarks or more with another one of its group.
+// The largest first, each in increasing order. A picture that shares with none is a group of its
+// own. Pictures outside 0 to `pictures` - 1 are ignored.
 [[nodiscard]] std::vector<std::vector<int>> connected_pictures(int pictures,
                                                                std::vector<SeenIn> seen,
                                                                int least_common);

@@ -10,10 +10,10 @@
 namespace alidade {
 namespace {
 
-// Of each picture, which the retrieval asks with.
+// Features of each picture that are used for retrieval.
 constexpr std::size_t kAskingFeatures = 300;
 constexpr int kRetrievalChecks = 32;
-// Of a match while the lens is unknown, of the threshold.
+// Sigma of a match while the lens is unknown, as a share of the threshold.
 constexpr double kStartSigmaShare = 0.25;
 
 Camera<double> plain_camera(int width, int height, double log_f) {
@@ -25,11 +25,11 @@ Camera<double> plain_camera(int width, int height, double log_f) {
 }
 
 struct Candidate {
-  double rank = 0;  // the smaller the better
+  double rank = 0;  // smaller is better
   int partner = 0;
 };
 
-// The best of each picture's candidates.
+// The best candidates of each picture, as pairs.
 std::set<std::pair<int, int>> best_pairs(std::vector<std::vector<Candidate>> candidates, int most) {
   std::set<std::pair<int, int>> out;
   for (std::size_t i = 0; i < candidates.size(); ++i) {
@@ -47,7 +47,7 @@ std::set<std::pair<int, int>> best_pairs(std::vector<std::vector<Candidate>> can
 
 bool is_placed(const LinkedPicture& picture) { return picture.R_base_from_camera.has_value(); }
 
-// By telemetry and zoom, of those that have them.
+// Candidates among pictures with telemetry, by telemetry and zoom.
 void add_placed(const std::vector<LinkedPicture>& pictures, int width, int height,
                 const LinkOptions& options, std::vector<std::vector<Candidate>>* candidates) {
   const double diagonal = std::hypot(width, height);
@@ -72,7 +72,7 @@ void add_placed(const std::vector<LinkedPicture>& pictures, int width, int heigh
   }
 }
 
-// By what their features resemble, for those of which no place is known.
+// Candidates for pictures without telemetry, by similar features.
 void add_retrieved(const std::vector<LinkedPicture>& pictures,
                    std::vector<std::vector<Candidate>>* candidates) {
   std::vector<Descriptor> all;
@@ -91,7 +91,8 @@ void add_retrieved(const std::vector<LinkedPicture>& pictures,
         descriptors.begin(), descriptors.begin() + static_cast<std::ptrdiff_t>(asking));
     std::vector<double> votes(pictures.size(), 0);
     for (const NearFeatures& near : index.nearest(queries, kRetrievalChecks)) {
-      // The feature itself is the nearest; a vote is worth more the further the last of the near ones is.
+      // The feature itself is the nearest. A vote counts more the farther the last of the near ones
+      // is.
       const double furthest = near.back().square;
       for (const NearFeature& one : near) {
         if (one.indexed < 0 || !(furthest > 0)) break;
@@ -106,7 +107,7 @@ void add_retrieved(const std::vector<LinkedPicture>& pictures,
   }
 }
 
-// The pose of b in the frame of a; f_b: with what is not known of f of a.
+// The pose of b in the frame of a. f_b: prior of f of b, which includes the uncertainty of f of a.
 PicturePose relative_pose(const std::vector<LinkedPicture>& pictures, const PictureLink& link,
                           const LensCurve& lens, double log_f_a, const FocalLengthPrior& f_b,
                           double threshold_px) {
@@ -119,7 +120,7 @@ PicturePose relative_pose(const std::vector<LinkedPicture>& pictures, const Pict
     PoseMatch m;
     m.u = b.features.features[static_cast<std::size_t>(match.query)].u;
     m.sigma_px = kStartSigmaShare * threshold_px;
-    // One without a direction keeps its place, unusable.
+    // A match without a direction keeps its index but is unusable.
     if (unproject_to_map(camera_a, a.motion, I,
                          a.features.features[static_cast<std::size_t>(match.indexed)].u,
                          &m.d_b) != ProjectionStatus::kOk) {
@@ -200,7 +201,7 @@ std::optional<double> common_focal_length(const std::vector<LinkedPicture>& pict
                                           int height, const LinkOptions& options) {
   constexpr std::size_t kLinks = 8;     // that are tried
   constexpr double kStep = 0.12;        // of log f
-  constexpr double kLeastWidths = 0.4;  // f, in widths of the image
+  constexpr double kLeastWidths = 0.4;  // f, in image widths
   constexpr double kMostWidths = 12;
   std::vector<const PictureLink*> strongest;
   strongest.reserve(links.size());

@@ -1,9 +1,9 @@
 #pragma once
-// What pictures have in common: which twos are worth comparing, their matches, and whether a turn and a change of f explain them.
-//   compared   where telemetry and zoom say that both see the same; else those that retrieval over all features names
-//   checked    as the pose of the one in the other's frame (picture_pose.h); the lens need not be known yet: the threshold allows
-//              for its distortion
-// Batch work: allocates. Pure.
+// Pairs of pictures: which are worth comparing, their matches, and whether a rotation and a change
+// of f explain these. Compared are pictures that by telemetry and zoom see the same; without
+// telemetry those that retrieval over all features suggests. A link is checked as the pose of one
+// picture in the other's frame (picture_pose.h). The lens need not be known yet: the threshold
+// allows for its distortion. Batch work: allocates. Pure.
 
 #include <optional>
 #include <utility>
@@ -22,28 +22,28 @@ struct LinkedPicture {
   PictureMotion motion;
   double log_f = 0;
   double log_f_sigma = 0.05;
-  std::optional<Matrix3<double>> R_base_from_camera;  // by telemetry
+  std::optional<Matrix3<double>> R_base_from_camera;  // from telemetry
   double R_sigma = 0;                                 // rad
 };
 
 struct LinkOptions {
   double ratio = 0.8;
-  int most_partners = 12;          // of each picture that are compared with it
-  double most_log_f_off = 1.2;     // of two pictures: more and few features are of a size in both
-  double threshold_share = 0.008;  // of the image's width: what distortion may put a match off by
+  int most_partners = 12;          // of each picture
+  double most_log_f_off = 1.2;     // of two pictures; beyond, few features have a size seen in both
+  double threshold_share = 0.008;  // of the image's width; how far distortion may move a match
   int least_inliers = 12;
 };
 
-// Increasing twos (a, b), a < b.
+// Increasing pairs (a, b), a < b.
 [[nodiscard]] std::vector<std::pair<int, int>> pairs_to_compare(
     const std::vector<LinkedPicture>& pictures, int width, int height, const LinkOptions& options);
 
 struct PictureLink {
   int a = 0;
   int b = 0;
-  std::vector<FeatureMatch> matches;  // query: of b, indexed: of a
+  std::vector<FeatureMatch> matches;  // query: feature of b; indexed: of a
   PoseStatus status = PoseStatus::kTooFewMatches;
-  // With kOk.
+  // With kOk:
   std::vector<int> inliers;  // of matches
   Matrix3<double> R_a_from_b = Matrix3<double>::Identity();
 };
@@ -51,19 +51,20 @@ struct PictureLink {
 [[nodiscard]] PictureLink match_pair(const std::vector<LinkedPicture>& pictures, int a, int b,
                                      const LinkOptions& options);
 
-// Sets all after the matches. lens gives distortion and centre.
+// Sets status, inliers and R_a_from_b. lens: distortion and centre.
 void check_link(const std::vector<LinkedPicture>& pictures, const LensCurve& lens,
                 const LinkOptions& options, PictureLink* link);
 
-// The one focal length, as log f, with which most matches of these links fit, for pictures of one lens that did not zoom; none: no
-// link fits with any.
+// The common focal length (log f) with which most matches of these links fit, for pictures of one
+// lens that did not zoom. Nothing if no link fits.
 [[nodiscard]] std::optional<double> common_focal_length(const std::vector<LinkedPicture>& pictures,
                                                         const std::vector<PictureLink>& links,
                                                         int width, int height,
                                                         const LinkOptions& options);
 
-// Orientations (R_base_from_camera) to begin with: those of telemetry, and along the strongest links from them; without any, from the
-// picture with most links, which looks forward. None: what does not hang together with those.
+// Start values of R_base_from_camera: from telemetry, and along the strongest links from there.
+// Without telemetry from the picture with most links, which looks forward. Nothing for pictures
+// that are not connected.
 [[nodiscard]] std::vector<std::optional<Matrix3<double>>> start_orientations(
     const std::vector<LinkedPicture>& pictures, const std::vector<PictureLink>& links);
 

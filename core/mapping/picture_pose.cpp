@@ -23,15 +23,15 @@ using internal::two_point_pose;
 using internal::TwoPointPose;
 
 constexpr int kMostSteps = 30;      // of an adjustment
-constexpr int kMostFirstSteps = 5;  // of one that is to find more inliers
-constexpr double kFirstNoise = 10;  // sigmas, of what two matches' pose leaves
-constexpr int kMostGrowths = 3;     // of the inliers of two matches' pose, by a motion
+constexpr int kMostFirstSteps = 5;  // of one that looks for more inliers
+constexpr double kFirstNoise = 10;  // sigmas that a pose of two matches may be off
+constexpr int kMostGrowths = 3;     // of the inliers of a pose of two matches, with a motion
 constexpr std::size_t kLeastGrown = 6;
 
-constexpr double kSureEnough =
-    1e-6;  // probability that no two inliers have been drawn, at which drawing ends
+// Probability that no pair of inliers was drawn, at which drawing ends.
+constexpr double kSureEnough = 1e-6;
 
-// MSAC's cost of a pose, px^2; the matches within the threshold where asked for.
+// MSAC cost of a pose, px^2, and its inliers if asked for.
 double cost_of(const std::vector<PoseMatch>& matches, const std::vector<int>& candidates,
                const LensCurve& lens, const PoseState& pose, double threshold_px, double give_up_at,
                std::vector<int>* inliers) {
@@ -61,11 +61,12 @@ struct Consensus {
 
 bool agrees_with_knowledge(const TwoPointPose& pose, const PoseKnowledge& knowledge,
                            const PoseOptions& options) {
-  // A motion that is not accounted for turns or stretches what two matches say, by as much as it shears the image.
+  // A motion that is ignored turns or stretches the pose of two matches by as much as it shears the
+  // image.
   const double sheared =
       2 * motion_reach_px(knowledge, pose.log_f) / (0.5 * knowledge.lens.height());
   if (knowledge.focal_length) {
-    // Two matches' own noise on top of the prior's.
+    // The noise of two matches adds to the prior's.
     const FocalLengthPrior& prior = *knowledge.focal_length;
     if (std::abs(pose.log_f - prior.log_f) > 4 * prior.sigma + 0.02 + sheared) return false;
   }
@@ -74,7 +75,7 @@ bool agrees_with_knowledge(const TwoPointPose& pose, const PoseKnowledge& knowle
          options.roll_tolerance + sheared;
 }
 
-// The pose of two matches with a motion as begun with; angles with a mount.
+// The state of a pose of two matches: with the start motion, and angles if there is a mount.
 PoseState state_of(const TwoPointPose& pose, const PoseKnowledge& knowledge) {
   PoseState out{pose.R_base_from_camera, {}, pose.log_f, knowledge.motion};
   if (knowledge.mechanics) {
@@ -115,7 +116,8 @@ Consensus best_pose(const std::vector<PoseMatch>& matches, const std::vector<int
     least = cost;
     best.pose = state;
     best.inliers = inliers;
-    // Two matches tell no motion: all that lie near the pose do, and with it there are more of them (Chum, Matas, Kittler 2003).
+    // Two matches do not determine a motion. All matches near the pose do, and with the motion more
+    // of them fit (Chum, Matas, Kittler 2003).
     if (moves) state = state_of(*pose, begun);
     for (int step = 0; moves && step < kMostGrowths; ++step) {
       if (best.inliers.size() < kLeastGrown ||
@@ -129,7 +131,7 @@ Consensus best_pose(const std::vector<PoseMatch>& matches, const std::vector<int
       best.inliers = inliers;
       begun.motion = state.motion;
     }
-    // Far-apart twos are needed: half of the good ones lie too near to each other to tell.
+    // Only pairs that are far apart determine a pose; half of the inlier pairs are too close.
     const double share =
         static_cast<double>(best.inliers.size()) / static_cast<double>(candidates.size());
     const double good = std::clamp(0.5 * share * share, 1e-9, 1 - 1e-9);
@@ -140,8 +142,8 @@ Consensus best_pose(const std::vector<PoseMatch>& matches, const std::vector<int
   return best;
 }
 
-// log10 of how many poses with as many inliers so many matches (two, four with a motion) would give, if all matches were wrong and
-// anywhere (Moisan, Stival 2004).
+// log10 of the expected number of poses with so many inliers if all matches were wrong and anywhere
+// (Moisan, Stival 2004). A pose takes two matches, with a motion four.
 double chance_log10(std::size_t matches, std::size_t inliers, double radius_px,
                     const PoseKnowledge& knowledge) {
   const double n = static_cast<double>(matches);
@@ -177,7 +179,7 @@ std::vector<int> without(const std::vector<int>& all, const std::vector<int>& so
   return out;
 }
 
-// Those whose numbers can be used.
+// Indices of matches with usable numbers.
 std::vector<int> usable(const std::vector<PoseMatch>& matches) {
   std::vector<int> out;
   for (std::size_t i = 0; i < matches.size(); ++i) {
@@ -238,7 +240,7 @@ PicturePose find_pose(const std::vector<PoseMatch>& matches, const PoseKnowledge
   }
   out.inliers = best.inliers;
   double noise = 1;
-  // Two matches' pose misses some that the adjusted one finds.
+  // The pose of two matches misses some inliers that the adjusted one finds.
   for (const double gate : {4 * options.gate_sigmas, 1.5 * options.gate_sigmas, options.gate_sigmas,
                             options.gate_sigmas}) {
     if (!adjust_pose(matches, out.inliers, knowledge, noise, kMostSteps, &state)) {

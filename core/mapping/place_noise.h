@@ -1,6 +1,7 @@
 #pragma once
-// Sigma of a feature's place by its size: large ones are less sharp. A guess to begin with, then what adjustments leave of observations:
-// each bin of sizes by the median of its errors' norms, over that of two standard normal numbers. Header only.
+// PlaceNoise: sigma of a feature's place by its size, as large features are less sharp. It starts
+// with a guess and learns from an adjustment's residuals: for each bin of sizes, the median of the
+// errors' norms over that of two standard normal numbers.
 
 #include <algorithm>
 #include <array>
@@ -21,10 +22,11 @@ class PlaceNoise {
     }
   }
 
-  // Of each coordinate, of a feature of that size.
+  // px; of each coordinate of a feature of that size.
   [[nodiscard]] double sigma_px(double scale_px) const { return sigma_[bin(scale_px)]; }
 
-  // Observations: each the size of its feature and the norm of its error, px. Bins with fewer than 100 are no sharper than the one below.
+  // scale_and_error: size of the feature and norm of the error, px. Bins with fewer than 100 are no
+  // sharper than the one below.
   void learn(const std::vector<std::pair<double, double>>& scale_and_error) {
     constexpr std::size_t kFewest = 100;
     const double median_of_norm = std::sqrt(2 * std::log(2.0));

@@ -13,18 +13,19 @@ namespace internal {
 namespace {
 
 constexpr double kHuber_sigmas = 2.5;
-// What nobody can tell of a motion is bounded all the same: sigma of a shift over the image's height in widths of it, of a turn about the
-// optical axis, rad, and of log f. A field of view a second and the fastest lenses, read out in 30 ms, lie within.
+// Bounds of an unknown motion over the image's height: sigma of a shift in image widths, of a turn
+// about the optical axis (rad), of log f. They include a field of view a second and the fastest
+// lenses, read out in 30 ms.
 constexpr double kWidestShift = 0.05;
 constexpr double kWidestRoll = 0.05;
 constexpr double kWidestZoom = 0.03;
-// And what is known is so to this, px and of log f: numbers stay invertible.
+// Least sigmas of a known motion, in px and of log f: keep the numbers invertible.
 constexpr double kLeastShift_px = 1e-3;
 constexpr double kLeastZoom = 1e-6;
-// Of a motion that is not about the mount's axes as they are known.
+// Share of a motion that is not about the mount's known axes.
 constexpr double kOffAxes = 0.02;
 
-// Of xi, log f, w, change of log f: the last four where the motion is not known.
+// Order: xi, log f, w, change of log f; the last four only if the motion is not known.
 constexpr int kPoseCount = 4;
 constexpr int kMostCount = 8;
 using Unknowns = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMostCount, 1>;
@@ -35,7 +36,7 @@ int full_count(const PoseKnowledge& knowledge) {
 }
 
 struct Residual {
-  Vector2<double> error;            // px, seen less predicted
+  Vector2<double> error;            // px, seen minus predicted
   Matrix<double, 2, kMostCount> J;  // of the prediction
   Matrix2<double> information;      // 1/px^2
   double square = 0;                // of the error in its sigmas
@@ -69,7 +70,7 @@ double zoom_sigma(const PoseKnowledge& knowledge) {
   return std::clamp(knowledge.motion_doubt.log_f, kLeastZoom, kWidestZoom);
 }
 
-// Information of w and the change of log f, about knowledge.motion.
+// Information of w and the change of log f about knowledge.motion.
 Matrix4<double> motion_information(const PoseKnowledge& knowledge, const PoseState& state) {
   const double sigma = turn_sigma(knowledge, state.log_f);
   const double doubt = std::max(sigma, knowledge.motion_doubt.turn);
@@ -80,7 +81,7 @@ Matrix4<double> motion_information(const PoseKnowledge& knowledge, const PoseSta
     Matrix<double, 3, 2> J;
     (void)R_base_from_camera(*mount, nearest_angles(*mount, state.R).angle, &J);
     for (int i = 0; i < 2; ++i) {
-      // A pan moves what is seen the less the higher the camera looks.
+      // A pan moves the image less the higher the camera looks.
       const double moving = std::max(0.1, J.col(i).head<2>().norm());
       covariance += std::pow(std::min(doubt, sigma / moving), 2) * J.col(i) * J.col(i).transpose();
     }
@@ -156,7 +157,8 @@ NormalEquations normal_equations(const std::vector<PoseMatch>& matches,
   return out;
 }
 
-// How all of them follow from what is adjusted: pan, tilt, log f of a mount, or xi, log f; then the motion.
+// Derivative of all parameters by the unknowns: pan, tilt, log f of a mount, or xi, log f; then the
+// motion.
 Square directions_of_change(const PoseKnowledge& knowledge, const PoseState& state) {
   const int count = full_count(knowledge);
   const int of_motion = count - kPoseCount;
@@ -238,7 +240,8 @@ bool adjust_pose(const std::vector<PoseMatch>& matches, const std::vector<int>& 
   return true;
 }
 
-// By their median, which wrong ones hardly move. With a gate by the claim alone, what is left of larger noise would look calm.
+// From the median, which outliers hardly move. A gate by the claimed sigmas alone would hide larger
+// noise.
 double noise_of(const std::vector<PoseMatch>& matches, const std::vector<int>& inliers,
                 const PoseKnowledge& knowledge, const PoseState& state) {
   CameraColumn J_camera_log;

@@ -1,10 +1,10 @@
 #pragma once
-// Least squares of one picture's pose over matches that are thought to be right, for picture_pose.cpp alone.
-//   adjusted   R and log f (pan, tilt, log f of a mount) and, where it is not known, what the camera does while the picture is read out:
-//              its turn w and the change of log f over the image's height
-//   prior      of w: the mount's axes turn at rates of so many rad; what else it could be is a fiftieth of that. Without a mount each
-//              axis by itself
-// Knowledge is in heights (in_heights()) where the motion is adjusted. Allocates; no shared state.
+// Least squares of one picture's pose over presumed inliers, for picture_pose.cpp alone. Unknowns:
+// R and log f (with a mount pan, tilt, log f); if the motion during the read-out is not known, also
+// the turn w and the change of log f over the image's height.
+// Prior of w: the mount's axes turn at rates with a sigma in rad; turns about other axes have a
+// fiftieth of it. Without a mount each axis by itself. Where the motion is adjusted, knowledge is
+// in heights (in_heights()). Allocates; no shared state.
 
 #include <optional>
 #include <vector>
@@ -22,21 +22,23 @@ struct PoseState {
 
 struct PoseFit {
   Matrix4<double> covariance;         // of xi, log f
-  Matrix4<double> motion_covariance;  // of w, change of log f; 0 if known
+  Matrix4<double> motion_covariance;  // of w and log f's change; 0 if known
   double noise_scale = 0;
 };
 
 [[nodiscard]] bool has_unknown_motion(const PoseKnowledge& knowledge);
 
-// While the picture was read out, the camera did what no head does: nothing was checked there.
+// Whether the estimated motion during the read-out is faster than any head, where the method was
+// not checked.
 [[nodiscard]] bool moves_too_far(const PoseKnowledge& knowledge, const PoseState& state);
 
-// Levenberg-Marquardt, errors by Huber in sigmas times `noise`; false: no minimum.
+// Levenberg-Marquardt with Huber's loss in sigmas times `noise`. False: a step is not finite or
+// runs away.
 [[nodiscard]] bool adjust_pose(const std::vector<PoseMatch>& matches,
                                const std::vector<int>& inliers, const PoseKnowledge& knowledge,
                                double noise, int max_steps, PoseState* state);
 
-// How much larger the residuals are than claimed, 1 at least.
+// How much larger the residuals are than claimed; at least 1.
 [[nodiscard]] double noise_of(const std::vector<PoseMatch>& matches,
                               const std::vector<int>& inliers, const PoseKnowledge& knowledge,
                               const PoseState& state);
@@ -46,7 +48,7 @@ struct PoseFit {
                                            const PoseKnowledge& knowledge, const PoseState& state,
                                            double gate_sigmas);
 
-// None: the matches do not determine it.
+// Nothing if the matches do not determine the pose.
 [[nodiscard]] std::optional<PoseFit> fit_of(const std::vector<PoseMatch>& matches,
                                             const std::vector<int>& inliers,
                                             const PoseKnowledge& knowledge, const PoseState& state,

@@ -8,14 +8,14 @@ namespace alidade {
 namespace {
 
 constexpr double kUnitTolerance = 1e-9;
-// Of time stamps: the years 1970 to 5138. One further off is a mistake of units.
+// Time stamps from 1970 to 5138. One outside is in another unit.
 constexpr double kMostUtc_s = 1e11;
 
 bool is_unit_vector(const Vector3<double>& d) {
   return d.allFinite() && std::abs(d.norm() - 1) <= kUnitTolerance;
 }
 
-// Symmetric, and positive semidefinite up to rounding: judged on the correlations.
+// Symmetric, and positive semidefinite up to rounding, judged on the correlations.
 template <int kSize>
 bool is_covariance_matrix(const Matrix<double, kSize, kSize>& m) {
   constexpr double kRounding = 1e-9;
@@ -39,14 +39,15 @@ bool is_covariance_matrix(const Matrix<double, kSize, kSize>& m) {
   return correlation.llt().info() == Eigen::Success;
 }
 
-// Ids are given one after the other, and never again: no map comes as far, and each has a next one.
+// Ids are used one after the other and never again. No map reaches this one, and each has a next
+// one.
 constexpr std::int64_t kMostId = std::int64_t{1} << 53;
 
 bool is_id(std::int64_t id) { return id >= 1 && id <= kMostId; }
 
 bool is_time(double utc_s) { return std::abs(utc_s) <= kMostUtc_s; }
 
-// A focal length between half a pixel and a kilometre of them.
+// f from 0.4 to 1.3e9 px.
 bool is_log_focal_length(double log_f) { return log_f > -1 && log_f < 21; }
 
 const char* flaw_of(const SceneKeyframe& k) {

@@ -1,14 +1,10 @@
 #pragma once
-// SceneMap: all that a finished map is, as plain data: what is adjusted, stored, localized against and kept up.
-//   keyframe   a picture that stays: where it looked when its reference row was exposed, with which f, and where that comes from
-//   landmark   something that can be recognised: direction on the sphere, base; appearance; size; what became of looking for it
+// SceneMap: a finished map as plain data, to be adjusted, stored, localized against and kept up.
+//   keyframe   a picture that stays: where it looked at its reference row, with which f, and its
+//              origin. log f = s + delta(s) + eps (lens_curve.h), s its position.
+//   landmark   a thing that can be recognised: direction in base, appearance, size, history
 //   sighting   where a keyframe sees a landmark
-// log f of a keyframe = s + delta(s) + eps, s its position (lens_curve.h). A landmark's error has two parts: its own, independent of other
-// landmarks', and one in common with its neighbours, which no pose that was found from them can tell: as if the base were turned.
-// Both stand in tangent_basis(d_b), rad^2; the error of d_b is their sum. What finds a pose takes its landmarks' own parts, and adds
-// the common one to the pose.
-// Keyframes and landmarks stand in increasing order of their ids, which are never given twice. Times of day outlast a restart: seconds
-// of UTC since 1970. No allocation but the vectors'. Free of shared state.
+// Ids increase and are never reused. Times are UTC seconds since 1970. Only the vectors allocate.
 
 #include <Eigen/Geometry>
 #include <cstddef>
@@ -30,16 +26,16 @@ struct SceneKeyframe {
   std::string recording;
   std::int64_t frame = 0;  // of the recording, from 0
   double time_utc_s = 0;
-  std::optional<double> zoom;                // reading, as the lens gives it
+  std::optional<double> zoom;                // reading, in the lens's own unit
   double position = 0;                       // s: log f by the zoom reading
   std::optional<PanTilt<double>> telemetry;  // measured angles
   Eigen::Quaterniond R_base_from_camera = Eigen::Quaterniond::Identity();
   double eps = 0;
-  Matrix4<double> covariance = Matrix4<double>::Zero();        // of xi in R Exp(xi), rad, and log f
+  Matrix4<double> covariance = Matrix4<double>::Zero();        // of xi in R Exp(xi) (rad) and log f
   Vector3<double> angular_velocity = Vector3<double>::Zero();  // camera frame, rad/s
   double zoom_rate = 0;                                        // d log f / dt, 1/s
-  double residual_px = 0;             // root mean square over its sightings
-  std::vector<std::uint8_t> picture;  // coded luma; may be empty
+  double residual_px = 0;                                      // rms over its sightings
+  std::vector<std::uint8_t> picture;                           // coded luma; may be empty
 };
 
 struct SceneSighting {
@@ -52,27 +48,31 @@ struct LandmarkLife {
   double born_utc_s = 0;
   double last_seen_utc_s = 0;
   std::uint32_t looked_for = 0;  // views in which it should have been found
-  std::uint32_t matched = 0;     // of those
-  std::uint32_t missed = 0;      // running, up to the latest: 0 if it was found there
+  std::uint32_t matched = 0;     // views in which it was found
+  std::uint32_t missed = 0;      // consecutive ones up to the latest look; 0 if it was found then
 };
 
 struct SceneLandmark {
   std::int64_t id = 0;  // 1 or more
   Vector3<double> d_b = Vector3<double>::UnitX();
+  // rad^2, in tangent_basis(d_b). The error of d_b has an own part, independent of other landmarks,
+  // and a part common with its neighbours, which a pose found from these cannot show: as if the
+  // base were turned. The whole is their sum. Poses are computed with the own parts; the common one
+  // is added to the pose.
   Matrix2<double> covariance = Matrix2<double>::Zero();         // own part
   Matrix2<double> shared_covariance = Matrix2<double>::Zero();  // common part
-  double scale_rad = 0;        // sigma of the blob, as an angle; above 0
+  double scale_rad = 0;        // sigma of the blob as an angle; > 0
   double focal_length_px = 0;  // at which it was seen
   Descriptor descriptor{};
   LandmarkLife life;
-  std::vector<SceneSighting>
-      sightings;  // by increasing keyframe, one each; none of what was born later
+  // By increasing keyframe, one each. Landmarks born later have none.
+  std::vector<SceneSighting> sightings;
 
   [[nodiscard]] Matrix2<double> whole_covariance() const { return covariance + shared_covariance; }
 };
 
 struct SceneMap {
-  // What there can be at most; with pictures that is more than a board's memory, see scene_map_file.h.
+  // Upper limits. With pictures they exceed a board's memory, see scene_map_file.h.
   static constexpr std::size_t kMostKeyframes = 100'000;
   static constexpr std::size_t kMostLandmarks = 1'000'000;
   static constexpr std::size_t kMostSightings = 10'000'000;
@@ -81,13 +81,13 @@ struct SceneMap {
   static constexpr int kMostImageSide = 16384;                             // px
   static constexpr int kMostLensPoints = 1000;
 
-  LensCurve lens;            // with the size of the image
+  LensCurve lens;            // includes the image's size
   double line_delay = 0;     // s/row, any sign
   double reference_row = 0;  // px
   std::optional<Mechanics<double>> mechanics;
   std::vector<SceneKeyframe> keyframes;
   std::vector<SceneLandmark> landmarks;
-  std::int64_t next_landmark = 1;  // id; above all that were ever given
+  std::int64_t next_landmark = 1;  // id; above all ids ever used
 
   [[nodiscard]] PictureMotion motion_of(const SceneKeyframe& keyframe) const {
     return {keyframe.angular_velocity, keyframe.zoom_rate, line_delay, reference_row};
@@ -97,13 +97,13 @@ struct SceneMap {
   }
 };
 
-// Index of the keyframe or landmark with this id; none: -1.
+// Index of the keyframe or landmark with this id; -1 if there is none.
 [[nodiscard]] std::ptrdiff_t keyframe_index(const SceneMap& map, std::int64_t id);
 [[nodiscard]] std::ptrdiff_t landmark_index(const SceneMap& map, std::int64_t id);
 
-// Whether every number can be what it stands for, and every id leads somewhere. error, one line, names what does not.
+// Whether every number is possible and every id exists. *error: one line that names what is not.
 [[nodiscard]] bool is_valid(const SceneMap& map, std::string* error = nullptr);
-// The same of one, whatever map it is to become a part of. A sighting's keyframe is not looked up.
+// The same for one part of any map. Does not look up a sighting's keyframe.
 [[nodiscard]] bool is_valid(const SceneKeyframe& keyframe, std::string* error = nullptr);
 [[nodiscard]] bool is_valid(const SceneLandmark& landmark, std::string* error = nullptr);
 

@@ -1,6 +1,7 @@
 #pragma once
-// Cells of about equal size on the unit sphere, of a size that goes with what they hold: rings of constant latitude, each cut into as
-// many cells as it has room for. What is as large as an octave of scales, [2^o, 2^(o+1)) rad, has cells of `scales` 2^o rad. Pure.
+// Cells of about equal size on the unit sphere: rings of constant latitude, each divided into as
+// many cells as it has room for. Things with scales in an octave [2^o, 2^(o+1)) rad have cells of
+// `scales` 2^o rad. Pure.
 
 #include <algorithm>
 #include <cmath>
@@ -11,11 +12,12 @@
 
 namespace alidade {
 
-// The cell's number: equal for what shares octave and cell, different for all else. d of unit length; scale_rad from 2^-60 to 1.
+// The cell's number: the same for equal octave and cell only. d: unit length. scale_rad: 2^-60 to
+// 1.
 [[nodiscard]] inline std::uint64_t sphere_cell(const Vector3<double>& d, double scale_rad,
                                                double scales) {
   const int octave = std::clamp(std::ilogb(scale_rad), -60, 0);
-  // No finer than what the number has room for.
+  // No finer than the number has room for.
   const double side = std::clamp(scales * std::ldexp(1.0, octave), 1e-6, kPi);
   const double from_pole = std::acos(std::clamp(d.z(), -1.0, 1.0));
   const double ring = std::floor(from_pole / side);

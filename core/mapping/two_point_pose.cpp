@@ -6,7 +6,7 @@
 namespace alidade::internal {
 namespace {
 
-// The orthonormal frame with its first axis along a and its second in the plane of a and b.
+// Orthonormal frame: first axis along a, second in the plane of a and b.
 std::optional<Matrix3<double>> frame_of(const Vector3<double>& a, const Vector3<double>& b) {
   const Vector3<double> normal = a.cross(b);
   const double sine = normal.norm();
@@ -22,7 +22,7 @@ double angle_between(const Vector3<double>& a, const Vector3<double>& b) {
   return std::atan2(a.cross(b).norm(), a.dot(b));
 }
 
-// Rays of both pixels in the camera's frame when the reference row is exposed.
+// Rays of both pixels in the camera's frame at the reference row.
 bool rays_of(const PoseMatch& a, const PoseMatch& b, const PoseKnowledge& knowledge, double log_f,
              Vector3<double>* ray_a, Vector3<double>* ray_b) {
   const Camera<double> camera = knowledge.lens.camera_of(log_f);
@@ -38,7 +38,8 @@ std::optional<TwoPointPose> two_point_pose(const PoseMatch& a, const PoseMatch& 
   const double wanted = angle_between(a.d_b, b.d_b);
   const double apart_px = (a.u - b.u).norm();
   if (!(wanted > 1e-7) || !(apart_px > 2) || !(wanted < 2.5)) return std::nullopt;
-  // log of the angle falls with log f at a slope near -1: Newton with that slope, then secants.
+  // The log of the angle falls with log f with a slope near -1: Newton with that slope, then
+  // secants.
   double log_f = std::clamp(std::log(apart_px / (2 * std::tan(wanted / 2))), knowledge.least_log_f,
                             knowledge.most_log_f);
   Vector3<double> ray_a;

@@ -1,5 +1,6 @@
 #pragma once
-// Rotation and focal length from two matches. No allocation, no shared state.
+// Rotation and focal length from two matches. No allocation, no shared state. Method:
+// docs/derivations.md (picture_pose.h).
 
 #include <optional>
 
@@ -12,7 +13,8 @@ struct TwoPointPose {
   double log_f = 0;
 };
 
-// Exact for exact matches. Empty: directions or pixels that coincide, f outside its range.
+// Exact for exact matches. Empty: directions or pixels coincide, directions are more than 2.5 rad
+// apart, or f is out of its range.
 [[nodiscard]] std::optional<TwoPointPose> two_point_pose(const PoseMatch& a, const PoseMatch& b,
                                                          const PoseKnowledge& knowledge);
 

@@ -1,6 +1,6 @@
 #pragma once
-// What LandmarkUpkeep knows of the picture that it is shown, for map_upkeep.cpp and landmark_birth.cpp alone: its pose, where it shows the
-// map's landmarks, and what of them was found and changed.
+// LandmarkUpkeep's data on one picture, for map_upkeep.cpp and landmark_birth.cpp alone: its pose,
+// where it shows the map's landmarks, and what was found and changed of them.
 
 #include <cstddef>
 #include <cstdint>
@@ -24,19 +24,20 @@ struct LandmarkUpkeep::Picture {
     [[nodiscard]] double area() const { return empty ? 0 : (most - least).prod(); }
   };
   struct Visible {
-    std::size_t index = 0;  // in the map
+    std::size_t index = 0;  // into the map's landmarks
     Vector2<double> u;
     double scale_px = 0;
     bool expected = false;
   };
 
   PosedPicture posed;
-  Matrix3<double> common = Matrix3<double>::Zero();  // of the matched landmarks, on all sides, base
+  // Mean of the matched landmarks' common covariances, base.
+  Matrix3<double> common = Matrix3<double>::Zero();
   double share_of_landmarks = 0;
   Box matched;
-  std::vector<char> taken;         // by feature: matched
+  std::vector<char> taken;         // by feature: 1 if matched
   std::vector<Visible> visible;    // by increasing index
-  std::vector<std::size_t> found;  // indices of landmarks that were matched, increasing
+  std::vector<std::size_t> found;  // indices of matched landmarks, increasing
   std::map<std::int64_t, SceneLandmark> changed;
 
   [[nodiscard]] Matrix2<double> common_at(const Vector3<double>& d_b) const {

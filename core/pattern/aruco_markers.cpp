@@ -27,13 +27,13 @@ std::vector<ArucoMarker> find_markers(const cv::Mat& image, int dictionary) {
   const int window_px = 2 * (image.cols / 100) + 1;
   parameters->adaptiveThreshWinSizeMin = std::max(kLeastThresholdWindow_px, window_px);
   parameters->adaptiveThreshWinSizeMax = parameters->adaptiveThreshWinSizeMin;
-  // Of two outlines nearer to each other than this OpenCV drops the smaller one: a marker in its square.
+  // Of two outlines closer than this OpenCV drops the smaller one: a marker within its square.
   parameters->minMarkerDistanceRate = 0.01;
   std::vector<std::vector<cv::Point2f>> corners;
   std::vector<int> ids;
   cv::aruco::detectMarkers(image, cv::aruco::getPredefinedDictionary(dictionary), corners, ids,
                            parameters);
-  // Then the border of a large marker is found on both of its sides: the outer one is meant.
+  // With that, both sides of a large marker's border are found: the outer one is right.
   std::map<int, ArucoMarker> markers;
   for (std::size_t i = 0; i < ids.size(); ++i) {
     ArucoMarker& marker = markers[ids[i]];

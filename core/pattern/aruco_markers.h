@@ -1,13 +1,13 @@
 #pragma once
-// Square markers of OpenCV's predefined dictionaries: all that needs opencv_aruco, which not every build has (aruco_markers.cpp or
-// no_aruco_markers.cpp, chosen by CMake).
+// Square markers of OpenCV's predefined dictionaries. This is all that needs opencv_aruco, which
+// not every build has: CMake chooses aruco_markers.cpp or no_aruco_markers.cpp.
 
 #include <opencv2/core.hpp>
 #include <vector>
 
 namespace alidade::internal {
 
-// False: a build without; the others then find and give nothing.
+// False in a build without opencv_aruco; the other functions then return nothing.
 [[nodiscard]] bool has_aruco();
 
 struct ArucoMarker {
@@ -15,10 +15,11 @@ struct ArucoMarker {
   std::vector<cv::Point2f> corners;  // OpenCV's pixels, from the marker's upper left clockwise
 };
 
-// dictionary: index into kMarkerDictionaries. Each id once. Corners to about a pixel; some may be of what is no marker.
+// dictionary: index into kMarkerDictionaries. Each id at most once. Corners to about a pixel. Some
+// may not be markers.
 [[nodiscard]] std::vector<ArucoMarker> find_markers(const cv::Mat& image, int dictionary);
 
-// A marker's cells as printed, with its border of one black cell: 0 black, else white.
+// A marker's cells as printed, with its border of one black cell: 0 is black, all else white.
 [[nodiscard]] cv::Mat marker_cells(int dictionary, int id);
 
 }  // namespace alidade::internal

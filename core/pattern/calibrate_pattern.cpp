@@ -26,21 +26,23 @@ using internal::PatternState;
 using internal::PatternViews;
 
 constexpr int kMaxRounds = 20;
-constexpr int kRoughSteps = 8;  // of a round: what they gain the next round's knots may undo
+constexpr int kRoughSteps = 8;  // in a round: the next round's knots may undo what more steps gain
 constexpr int kFinalSteps = 50;
-constexpr double kFar = 1e4;  // trust regions
+constexpr double kFar = 1e4;  // first trust regions
 constexpr double kNear = 1e8;
-// Times what chance gains, below which the curve follows the motion but for little: a lens that is some per cent off takes five.
+// Below this multiple of chance's gain the curve follows the motion almost fully. A lens that is
+// some per cent off takes five.
 constexpr double kFollowed = 20;
 constexpr double kSpacing_frames = 1.5;                     // of the first knots
 constexpr double kSpacing_s = 0.2;                          // and no closer than this
 constexpr double kLeastSigma_px = 0.01;                     // better than any detector
 constexpr double kMedianOfChiSquare2 = 1.3862943611198906;  // 2 ln 2
-// Squared error over variance beyond which a detection is wrong: chance does it once in 270,000.
+// Squared error over variance beyond which a detection is wrong; chance reaches it once in 270,000.
 constexpr double kWrong = 25;
 constexpr int kLeastFrames = 12;
 
-// The detections' noise if half of them are right, and which of them are wrong by it.
+// Estimates the detections' noise on the assumption that half of them are right, and masks those
+// that are wrong by it.
 double leave_out_wrong(const PatternData& data, const PatternState& state, PatternMask* used) {
   const std::vector<PatternResidual> residuals = pattern_residuals(data, state.lens, state.curve);
   std::vector<double> squares;
@@ -58,19 +60,20 @@ double leave_out_wrong(const PatternData& data, const PatternState& state, Patte
   return std::sqrt(variance);
 }
 
-// How far apart in time a hand's accelerations are related: turns of less than 2 Hz.
+// Time over which a hand's accelerations are correlated: turns below 2 Hz.
 constexpr double kAccelerationTime_s = 0.1;
 
-// What the curve may do where the data leave it free, as much as the motion itself did. Where it has two knots a frame, pose and speed
-// of each frame are free; rows that are exposed at once tell the pose alone, and some line delay beside 0 would then explain
-// noise by a speed that suits it.
+// Sets the prior of the accelerations to those of the motion itself. It matters where the data
+// leave the curve free: with two knots a frame, pose and speed of each frame are free. Rows that
+// are exposed at once determine only the pose. A line delay beside 0 would then explain noise by
+// suitable speeds.
 void expect_accelerations(const PoseCurve& curve, PatternAdjustmentOptions* options) {
   const PoseVector mean = internal::mean_square_acceleration(curve);
   options->position_noise = std::max(1e-9, kAccelerationTime_s * mean.head<3>().mean());
   options->rotation_noise = std::max(1e-9, kAccelerationTime_s * mean.tail<3>().mean());
 }
 
-// Is the image read out in less than a hundredth of a frame's time?
+// Whether the image is read out in less than a hundredth of a frame's time.
 bool is_almost_at_once(const PatternData& data, const LensVector& lens,
                        const LensKnowledge& knowledge, double frame_interval_s) {
   constexpr double kReadout = 0.01;
@@ -79,9 +82,10 @@ bool is_almost_at_once(const PatternData& data, const LensVector& lens,
          std::abs(lens[kDelay]) * data.height < kReadout * frame_interval_s;
 }
 
-// Rows that are exposed at once do not tell how fast the camera moves; their neighbours in time do, more or less well. A least-squares
-// fit of both would find the speeds that, with some line delay beside 0, explain noise. So the curve as if there were no line
-// delay, then one step of all from there, in which the line delay has no part in the speeds.
+// Rows that are exposed at once do not show how fast the camera moves; neighbouring frames do, more
+// or less well. A least-squares fit of both finds speeds that explain noise with some line delay
+// beside 0. So first fits the curve with a line delay of 0. Then makes one step of all parameters,
+// in which the line delay does not affect the speeds.
 bool take_as_at_once(const PatternData& data, const PatternMask& used,
                      const LensKnowledge& knowledge, PatternAdjustmentOptions options,
                      PatternState* state) {
@@ -96,7 +100,7 @@ bool take_as_at_once(const PatternData& data, const PatternMask& used,
   return internal::adjust_pattern(data, used, knowledge, options, state) != AdjustmentEnd::kFailed;
 }
 
-// Some of a frame's points tell its pose well enough for where the curve begins.
+// Some of a frame's points determine its pose well enough for the first curves.
 PatternMask thinned(PatternMask used) {
   constexpr int kEnough = 48;
   for (auto& frame : used) {
@@ -122,10 +126,12 @@ PatternCalibration refused(PatternCalibration result, PatternStatus status, std:
   return result;
 }
 
-// What the finest curve misses of the motion, as a multiple of what chance would gain by finer knots all along; 1 within chance.
-// The lens bends to it in the same way all along, so that errors grow with it and not with its root: simulated motions at 1.6 to 3
-// times had errors of up to 6 sigmas of what was followed. Detections that err together within a frame, by blur and by where in a
-// pixel corners lie, take up to twice what independent ones do; a motion that is not followed takes tens of times.
+// How much of the motion the finest curve misses, as a multiple of what chance gains by finer knots
+// everywhere; 1 within chance. The lens is biased in the same way everywhere, so errors grow with
+// this number, not with its root: simulated motions at 1.6 to 3 had errors of up to 6 times the
+// sigmas of motions that were followed. Correlated errors within a frame (blur, corners' places
+// within pixels) reach twice the gain of independent ones; a motion that is not followed reaches
+// tens of times.
 double missed_motion(const KnotScore& score) {
   const double beyond_chance = score.expected_of_short + 5 * std::sqrt(2 * score.expected_of_short);
   if (score.gain_of_short <= beyond_chance) return 1;
@@ -134,23 +140,24 @@ double missed_motion(const KnotScore& score) {
 }
 constexpr double kMostMissed = 4;
 
-// The share of its speed, in per cent, at which a motion that is missed by this much would be followed: what a cubic through four frames
-// misses grows as the fourth power of the speed, and a gain is a square. In tens, as it is a guess. Beyond kAnyhow the frames no longer
-// follow the motion at all, and the gain grows no more: simulated hands, four times too fast, were followed at a third.
+// Share of its speed (per cent) at which a missed motion would be followed. What a cubic through
+// four frames misses grows with the fourth power of the speed, and the gain with its square.
+// Rounded to tens, as it is a guess. Beyond kAnyhow the frames do not follow the motion at all and
+// the gain no longer grows: simulated hands, four times too fast, were followed at a third.
 double followed_speed(double missed) {
   constexpr double kAnyhow = 6;
   if (missed > kAnyhow) return 30;
   return 10 * std::max(1.0, std::floor(10 * std::pow((kMostMissed - 1) / (missed - 1), 0.125)));
 }
 
-// The larger one, a part of itself.
+// The larger relative one.
 double focal_length_sigma(const PatternCalibration& calibration) {
   return std::max(calibration.sigma(LensParameter::kFocalLengthU) / calibration.lens[0],
                   calibration.sigma(LensParameter::kFocalLengthV) / calibration.lens[1]);
 }
 
 constexpr double kLeastTravel = 0.01;  // of the image's height
-// Times the first focal length, beyond which it runs off because nothing holds it.
+// Factor to the first focal length beyond which nothing holds it.
 constexpr double kRunOff = 4;
 
 }  // namespace
@@ -223,8 +230,8 @@ PatternCalibration calibrate_pattern(const PatternData& as_detected,
   PatternAdjustmentOptions adjustment;
   double sigma_px = leave_out_wrong(data, state, &used);
 
-  // A curve that is too coarse bends the lens to what it cannot follow, and no later knots bring it back. So the curve and the
-  // line delay first; the rest of the lens as soon as further knots would gain little.
+  // A curve that is too coarse biases the lens, and later knots do not undo that. So curve and line
+  // delay come first, and the rest of the lens as soon as further knots would gain little.
   LensKnowledge held = knowledge;
   for (int i = 0; i < kLensParameterCount; ++i) {
     const auto k = static_cast<std::size_t>(i);
@@ -261,7 +268,7 @@ PatternCalibration calibrate_pattern(const PatternData& as_detected,
     score = internal::score_knots(data, used, state, score_options);
     const bool is_followed = score.gain < kFollowed * score.expected || score.split.empty();
     if (result.rounds == kMaxRounds) break;
-    // What a lens that is not there yet leaves must not be taken for motion.
+    // Residuals of a lens that has not converged must not be taken for motion.
     const bool is_settled = !is_held && end == AdjustmentEnd::kConverged;
     if (is_settled && score.split.empty()) break;
     if (is_followed) is_held = false;
@@ -269,7 +276,7 @@ PatternCalibration calibrate_pattern(const PatternData& as_detected,
     if (is_settled || !is_followed) state.curve = state.curve.split(score.split);
   }
 
-  // By least squares on what is right.
+  // Least squares on the inliers.
   adjustment.robust_scale = 0;
   adjustment.sigma_px = score_options.sigma_px;
   adjustment.relative_decrease = 1e-8;
@@ -317,7 +324,7 @@ PatternCalibration calibrate_pattern(const PatternData& as_detected,
         "the video determines neither lens nor line delay; " + internal::how_to_show(views));
   }
   result.covariance = covariance->independent;
-  // Before all else: with a lens that is not determined nothing else of the result means anything.
+  // Checked first: with an undetermined lens the rest of the result means nothing.
   if (!(focal_length_sigma(result) <= options.largest_focal_length_sigma)) {
     return refused(result, PatternStatus::kNoLens,
                    formatted("focal length known to %.1f %% only: the views are too much alike; ",

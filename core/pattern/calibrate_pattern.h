@@ -1,12 +1,11 @@
 #pragma once
-// Line delay and lens from a video of a known pattern before a moving camera (Oth et al., 2013), with intrinsics, distortion
-// and line delay estimated together, which the paper names as an open problem, and with their covariance.
-//   start: lens and poses as if all rows were exposed at once, a curve through the poses
-//   again and again: adjust curve and lens together, leave out wrong detections, estimate the detections' noise, split the curve
-//   where residuals ask for it; then once more on what is left, by least squares
-// What nothing in the data tells: a pattern that is larger or smaller than told in all directions. Lens and line delay are the
-// same then, positions and distances as much too small or too large. One that is stretched or bent is noticed by its misfit.
-// Batch work: it allocates. It touches no file.
+// calibrate_pattern(): line delay and lens, with covariance, from a video of a known pattern taken
+// by a moving camera (Oth et al., 2013). Intrinsics and distortion are estimated with the line
+// delay, which the paper leaves open. Start: lens and poses as if all rows were exposed at once.
+// Repeatedly: adjust curve and lens, reject wrong detections, estimate their noise, split the curve
+// where residuals ask for it. Last: least squares on the inliers. A pattern larger or smaller than
+// named is not noticed: lens and line delay stay the same, positions and distances scale. One that
+// is stretched or bent shows by its misfit. Batch work: allocates; touches no file.
 
 #include <string>
 #include <vector>
@@ -19,52 +18,53 @@ namespace alidade {
 
 enum class PatternStatus {
   kOk,
-  kBadInput,         // sizes, indices, times or numbers are not what pattern_data.h says
+  kBadInput,         // sizes, indices, times or numbers contradict pattern_data.h
   kNoPattern,        // no frame shows enough of the pattern
-  kTooFewFrames,     // or too short
-  kNoStart,          // the views determine no lens, not even roughly
+  kTooFewFrames,     // or the video is too short
+  kNoStart,          // the views do not determine a lens, even roughly
   kNotConverged,     // no curve explains the detections
-  kFrameRateTooLow,  // for the motion: the curve cannot follow it
-  kNoLineDelay,      // the image hardly moved while it was read out
-  kNoLens,           // views too much alike
+  kFrameRateTooLow,  // the curve cannot follow the motion
+  kNoLineDelay,      // the image hardly moved during the read-out
+  kNoLens,           // the views are too similar
 };
 
 struct PatternCalibrationOptions {
   LensKnowledge known;
-  double start_line_delay_s = 0;  // where the search begins, any sign
-  double largest_readout_sigma_s =
-      5e-4;  // standard deviation of line delay * height beyond which the motion was not enough
-  // Relative, beyond which the views were not enough: of simulated ones errors were up to 1.9 sigmas of 0.4 to 0.8 %, and up to 7 of
-  // 1 to 2 %.
+  double start_line_delay_s = 0;  // start value, any sign
+  // Largest standard deviation of line delay * height; beyond it the motion was not enough.
+  double largest_readout_sigma_s = 5e-4;
+  // Largest relative standard deviation; beyond it the views were not enough. Errors of simulated
+  // views were up to 1.9 sigmas for sigmas of 0.4 to 0.8 %, and up to 7 for 1 to 2 %.
   double largest_focal_length_sigma = 0.008;
 };
 
 struct PatternCalibration {
   PatternStatus status = PatternStatus::kBadInput;
-  std::string message;               // one line, if refused: what is wrong and what would help
-  std::vector<std::string> remarks;  // one line each, if not: what is worth knowing of it
+  std::string message;               // if refused: one line, what is wrong and what would help
+  std::vector<std::string> remarks;  // if not refused: one line each, what is worth knowing
 
   LensVector lens = LensVector::Zero();
-  LensMatrix covariance = LensMatrix::Zero();  // in LensParameter's units; 0 for what was fixed
+  LensMatrix covariance = LensMatrix::Zero();  // in LensParameter's units; 0 where fixed
   PoseCurve curve;                      // the camera in the pattern's frame, times as the data's
   double sigma_px = 0;                  // of a detection's coordinate, from the residuals
   double residual_rms_px = 0;           // of a coordinate
   int observations = 0;                 // used
-  int left_out = 0;                     // wrong detections, or none that fits
-  int frames = 0;                       // with observations that were used
+  int left_out = 0;                     // wrong detections, or those that cannot be projected
+  int frames = 0;                       // with used observations
   double frame_interval_s = 0;          // median
   int rounds = 0;                       // of splitting the curve
   std::vector<std::vector<char>> used;  // by frame and observation
 
   [[nodiscard]] double sigma(LensParameter parameter) const;
-  // The line delay is 0 within three sigmas.
+  // Whether the line delay is 0 within three sigmas.
   [[nodiscard]] bool has_global_shutter() const;
 };
 
 [[nodiscard]] PatternCalibration calibrate_pattern(const PatternData& data,
                                                    const PatternCalibrationOptions& options = {});
 
-// Residuals, px: projected minus observed, in the order of frames and observations; empty where the model sees none.
+// Projected minus observed, in the order of frames and observations; without those that cannot be
+// projected.
 struct PatternResidual {
   int frame = 0;
   int observation = 0;

@@ -22,18 +22,19 @@ constexpr double kRimWindow = 0.9;  // of the rim
 constexpr int kLeastRimWindow_px = 2;
 constexpr int kLargestRimWindow_px = 8;
 constexpr double kLeastCornerContrast = 8;   // grey levels, white above black
-constexpr double kLeastContrastShare = 0.4;  // of the image's median one
-// From a corner, where it is looked how bright its squares are.
+constexpr double kLeastContrastShare = 0.4;  // of the median of the image's corners
+// Distances from a corner at which the brightness of its squares is sampled.
 constexpr double kBlack_squares = 0.25;
 constexpr double kWhite_rims = 0.6;
 constexpr std::size_t kCornerNeighbours = 8;  // whose homography predicts a corner
-constexpr std::size_t kFewestCorners = 4;     // that are a board
-constexpr double kLargestAsymmetry = 0.2;     // of the standard deviation
-constexpr double kSettled_px = 1;             // of a corner's step, which paints over the same
-// How far a lens bends what neighbours on one side of a corner expect.
+constexpr std::size_t kFewestCorners = 4;     // needed for a board
+constexpr double kLargestAsymmetry = 0.2;     // share of the standard deviation
+constexpr double kSettled_px = 1;             // of a corner's step; then the paint stays the same
+// How far a lens bends the prediction from neighbours on one side of a corner.
 constexpr double kCornerFits_px = 1;
 constexpr double kCornerFits_squares = 0.08;
-// Of what is seen along the middle of a white rim: its sides that blur and noise leave bright.
+// Share of the samples along the middle of a white rim that the paint's brightness exceeds: sides
+// that blur and noise leave bright.
 constexpr double kWhiteShare = 0.9;
 
 // A square's corners from its middle, in squares.
@@ -43,7 +44,7 @@ const std::vector<cv::Point2f>& square_corners() {
   return corners;
 }
 
-// The nearest pixel's; black outside.
+// Grey level of the nearest pixel; black outside.
 double grey_at(const cv::Mat& image, const cv::Point2d& p) {
   if (!(p.x >= 0 && p.y >= 0 && p.x < image.cols - 1 && p.y < image.rows - 1)) return 0;
   return image.at<std::uint8_t>(static_cast<int>(std::lround(p.y)),
@@ -56,7 +57,7 @@ bool has_room(const cv::Mat& image, const cv::Point2f& p, int half) {
          p.y < static_cast<float>(image.rows) - edge - 1;
 }
 
-// How unlike itself after half a turn: mean difference, of the standard deviation.
+// How much a patch differs from itself after half a turn: mean difference over standard deviation.
 double asymmetry(const cv::Mat& image, const cv::Point2f& corner, int half) {
   cv::Mat patch;
   cv::getRectSubPix(image, {2 * half + 1, 2 * half + 1}, corner, patch);
@@ -124,7 +125,7 @@ void CharucoGrid::start(const Markers& markers) {
     square_px = std::min(square_px, marker.square_px);
   rim_window_px_ = std::clamp(static_cast<int>(kRimWindow * (0.5 - half_marker_) * square_px),
                               kLeastRimWindow_px, kLargestRimWindow_px);
-  // Between what the markers on both sides of a corner expect.
+  // Means of the predictions by the markers on both sides of a corner.
   struct Expected {
     cv::Point2d sum;
     int markers = 0;
@@ -263,7 +264,7 @@ cv::Mat CharucoGrid::painted(const cv::Mat& image, const Markers& markers) const
 }
 
 void CharucoGrid::finish(const cv::Mat& image, const Markers& markers) {
-  constexpr int kPasses = 3;  // blur leaves the corners off by more than what may be painted
+  constexpr int kPasses = 3;  // blur makes the corners err by more than the painted area allows
   bool is_settled = false;
   for (int pass = 0; pass < kPasses && !is_settled; ++pass) {
     const cv::Mat clean = painted(image, markers);
@@ -333,7 +334,7 @@ bool CharucoGrid::homography_about(const cv::Point2d& place, int without, bool r
                                    cv::Matx33d* image_from_board) const {
   const std::vector<int> points = corners_about(place, without);
   if (points.empty() || cv::norm(place - place_of(points.front())) > 1.5) return false;
-  // Two each in two rows: no three of them need be on one line.
+  // Needs two corners in each of two rows: then not all are on one line.
   std::vector<cv::Point2f> from;
   std::vector<cv::Point2f> to;
   std::vector<int> in_row(static_cast<std::size_t>(pattern_.rows), 0);

@@ -12,16 +12,17 @@
 namespace alidade::internal {
 namespace {
 
-// Of markers that vouch for each other: diagonal neighbours. Those of one row would on a board of other counts, too.
+// Distance of markers that confirm each other: diagonal neighbours. Those of one row would also
+// agree on a board of other counts.
 constexpr double kReach_squares = 1.5;
-constexpr double kAgrees_squares = 0.4;  // what a step to another square exceeds by far
+constexpr double kAgrees_squares = 0.4;  // far less than a step to another square
 constexpr std::size_t kFewMarkers = 3;   // fewer may be an accident
-// Of a dictionary of a thousand codes more quads are markers by accident.
+// In a dictionary of a thousand codes more quads are markers by accident.
 constexpr std::size_t kManyMarkers = 6;
-// The largest of each kind, which hold the smaller ones.
+// The largest dictionary of each kind, which contains the smaller ones.
 constexpr std::array<int, 9> kLargestDictionaries = {3, 7, 11, 15, 16, 17, 18, 19, 20};
-constexpr int kLastOfFour = 15;  // up to here four sizes of each kind
-constexpr int kClearLead = 3;    // of votes, which no single wrong marker gives
+constexpr int kLastOfFour = 15;  // up to here each kind has four sizes
+constexpr int kClearLead = 3;    // of votes; no single wrong marker gives as many
 
 }  // namespace
 
@@ -35,7 +36,7 @@ CharucoLayout::CharucoLayout(const KnownPattern& pattern) : pattern_(pattern) {
     for (int column = 0; column < pattern.columns; ++column)
       middles_[(column + row) % 2 == 1 ? 0 : 1].emplace_back(column - 0.5, row - 0.5);
   }
-  // Of an odd number of rows both are one.
+  // With an odd number of rows both layouts are the same.
   if (pattern.rows % 2 == 1) middles_[1] = middles_[0];
 }
 
@@ -108,7 +109,7 @@ std::vector<CharucoLayout::Marker> CharucoLayout::markers_in(const cv::Mat& imag
     for (std::size_t j = 0; j < i; ++j)
       agree[i][j] = agree[j][i] = agreement(seen[i], seen[j], chosen_);
   }
-  // The worst first: those that it speaks against may be right.
+  // Drops the worst marker first: those that disagree with it may be right.
   std::vector<Marker> kept;
   std::vector<std::size_t> left(count);
   std::iota(left.begin(), left.end(), 0);

@@ -15,26 +15,28 @@
 namespace alidade::internal {
 namespace {
 
-// Of the least distance of two circles in the pattern: radii. Circles have a quarter of it, the rest is for blur.
+// Radii, as shares of the least distance of two circles in the pattern. Circles have a quarter of
+// it, the rest is for blur.
 constexpr double kCircleWindow = 0.42;
-constexpr double kRim = 0.36;    // beyond lies paper
-constexpr double kCore = 0.1;    // within all is as dark as it gets
-constexpr double kFloor = 0.15;  // of the contrast: what is less dark is paper with noise
+constexpr double kRim = 0.36;    // beyond it is paper
+constexpr double kCore = 0.1;    // within it all is equally dark
+constexpr double kFloor = 0.15;  // of the contrast; what is less dark is paper with noise
 constexpr double kLeastCircleContrast = 10;  // grey levels
 constexpr int kTerms = 10;                   // of a polynomial of third degree
-constexpr std::size_t kManyPoints = 20;      // that determine it
+constexpr std::size_t kManyPoints = 20;      // needed to determine it
 constexpr double kDrawnRadius = 0.25;
-// Of an area from the others', relative, beyond which something lies on the circle: at least, and of the median one.
+// Relative difference of an area from the others', beyond which something lies on the circle: at
+// least this, and so many times the median difference.
 constexpr double kLeastDifference = 0.01;
 constexpr double kDifferences = 7;
 
 struct Blob {
   cv::Point2d centre;
   double area = 0;       // of what is darker than the floor, px^2; 0: not measured
-  double full_area = 0;  // with its blurred rim, which noise reaches more
+  double full_area = 0;  // with its blurred rim, which noise affects more
 };
 
-// An ellipse about a centre: what is round in the pattern.
+// An ellipse around a centre that is round in the pattern.
 struct Window {
   Matrix2<double> pattern_from_image;
   double half_width = 0, half_height = 0;  // px
@@ -106,7 +108,7 @@ Terms terms(double x, double y) {
       .finished();
 }
 
-// From the pattern to the image: a homography for perspective, then a polynomial for the lens.
+// Map from the pattern to the image: a homography for perspective, then a polynomial for the lens.
 class GridMap {
  public:
   GridMap(const std::vector<cv::Point2f>& places, const std::vector<cv::Point2f>& centres) {
@@ -134,7 +136,7 @@ class GridMap {
   }
 
  private:
-  static constexpr double kUnit_px = 300;  // makes polynomials of about one
+  static constexpr double kUnit_px = 300;  // scales the polynomials' arguments to about one
 
   [[nodiscard]] Vector2<double> undistorted(const Vector2<double>& place) const {
     const cv::Vec3d x = H_ * cv::Vec3d(place.x(), place.y(), 1);
@@ -179,7 +181,7 @@ CircleCentres refine_circles(const cv::Mat& image, const KnownPattern& pattern,
   }
   const GridMap map(places, *centres);
   if (!map.is_valid()) return found;
-  std::vector<double> ratios;  // of the areas measured to those of circles as drawn
+  std::vector<double> ratios;  // of the measured areas to those of circles as drawn
   std::vector<double> full_ratios;
   for (std::size_t i = 0; i < places.size(); ++i) {
     const double drawn = circle_image(map, place(i), kDrawnRadius).area;

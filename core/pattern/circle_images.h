@@ -1,5 +1,6 @@
 #pragma once
-// Of a circle's image the centroid is not where its centre is seen: perspective and lens bend, by some hundredths of a pixel.
+// The centroid of a circle's image is not the image of its centre: perspective and lens shift it by
+// some hundredths of a pixel.
 
 #include <algorithm>
 #include <cmath>
@@ -11,20 +12,20 @@
 
 namespace alidade {
 
-// Circles whose centres the detector took from their centroids by what the grid tells of lens and perspective, now by the lens and
-// the pose that are known. Other observations stay as they are.
+// Corrects the centres of circles. The detector derived them from centroids with the lens and
+// perspective of the grid; this uses the known lens and pose. Other observations stay as they are.
 [[nodiscard]] PatternData recentred(PatternData data, const LensVector& lens,
                                     const PoseCurve& curve);
 
 namespace internal {
 
 struct CircleImage {
-  Vector2<double> beside =
-      Vector2<double>::Zero();  // from the image of the centre to the centroid, px
-  double area = 0;              // px^2
+  // From the image of the centre to the centroid, px.
+  Vector2<double> beside = Vector2<double>::Zero();
+  double area = 0;  // px^2
 };
 
-// map: a place on the pattern to px. Of a polygon as large as the circle.
+// map: from a place on the pattern to px. Uses a polygon of the circle's area.
 template <class Map>
 [[nodiscard]] CircleImage circle_image(const Map& map, const Vector2<double>& centre,
                                        double radius) {

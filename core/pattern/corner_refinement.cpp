@@ -9,11 +9,11 @@
 namespace alidade::internal {
 namespace {
 
-// A part of the least distance of two points: a window that holds one corner only.
+// Share of the least distance of two points: the window then holds one corner only.
 constexpr double kWindow = 0.35;
 constexpr int kLargestWindow_px = 11;
 constexpr int kLeastWindow_px = 2;
-constexpr double kSmoothing = 0.14;  // standard deviation, of half the window
+constexpr double kSmoothing = 0.14;  // standard deviation, as a share of half the window
 
 }  // namespace
 
@@ -35,7 +35,8 @@ int corner_window(const std::vector<cv::Point2f>& corners) {
 
 void refine_corners(const cv::Mat& image, std::vector<cv::Point2f>* corners) {
   const int half = corner_window(*corners);
-  // Gradients by differences are wrong where edges are sharper than pixels: corners are three times better for it.
+  // Gradients by differences are wrong at edges sharper than a pixel. Smoothing makes corners three
+  // times better.
   cv::Mat smooth;
   cv::GaussianBlur(image, smooth, {0, 0}, kSmoothing * half);
   cv::cornerSubPix(smooth, *corners, {half, half}, {-1, -1},

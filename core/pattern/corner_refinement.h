@@ -6,13 +6,13 @@
 
 namespace alidade::internal {
 
-// px, of two of them; a large number if there are fewer.
+// Least distance of two corners, px; a large number if there are fewer than two.
 [[nodiscard]] double least_distance(const std::vector<cv::Point2f>& corners);
 
-// How far a window about one of them reaches to each side, px, so that it holds no other.
+// Half the side of a window around one corner that holds no other, px.
 [[nodiscard]] int corner_window(const std::vector<cv::Point2f>& corners);
 
-// Each in such a window.
+// Refines each corner in such a window.
 void refine_corners(const cv::Mat& image, std::vector<cv::Point2f>* corners);
 
 }  // namespace alidade::internal

@@ -1,6 +1,6 @@
 #pragma once
-// The image in cells about as high as wide, kColumns in a row, counted row by row: where in it points were seen. Pixels as in
-// pattern_data.h. Pure.
+// ImageCells: the image divided into roughly square cells, kColumns in a row, numbered row by row.
+// Used to count where points were seen. Pixels as in pattern_data.h. Pure.
 
 #include <algorithm>
 #include <cmath>
@@ -13,7 +13,7 @@ class ImageCells {
  public:
   static constexpr int kColumns = 16;
 
-  // px, both above 0.
+  // px, both > 0.
   ImageCells(int width, int height)
       : size_(width, height),
         rows_(std::clamp(
@@ -21,7 +21,7 @@ class ImageCells {
   }
 
   [[nodiscard]] int count() const { return kColumns * rows_; }
-  // Of a point outside the image the nearest.
+  // A point outside the image belongs to the nearest cell.
   [[nodiscard]] int cell_of(const Vector2<double>& u) const {
     return row_of(u.y()) * kColumns +
            std::clamp(static_cast<int>(u.x() * kColumns / size_.x()), 0, kColumns - 1);

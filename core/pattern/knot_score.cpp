@@ -13,7 +13,7 @@
 namespace alidade::internal {
 namespace {
 
-// What one observation says of a change x of the pose when it was exposed: |r + J x|^2.
+// Effect of a change x of the pose at an observation's exposure: its cost becomes |r + J x|^2.
 struct Scored {
   double time_s = 0;
   Vector2<double> r;
@@ -35,7 +35,7 @@ std::vector<Scored> scored(const PatternData& data, const PatternMask& used,
 
 struct Step {
   std::vector<double> gain;  // of each observation
-  int unknowns = 0;          // that the data hold
+  int unknowns = 0;          // that the data determine
 };
 
 // The best change of the control points of a curve with these knots.
@@ -95,7 +95,7 @@ Step best_step(const std::vector<Scored>& all, const PoseCurve& spline) {
   return step;
 }
 
-// Times of the frames that take part.
+// Times of the frames that are used.
 std::vector<double> times_used(const PatternData& data, const PatternMask& used) {
   std::vector<double> times;
   for (std::size_t f = 0; f < data.frames.size(); ++f) {
@@ -105,7 +105,7 @@ std::vector<double> times_used(const PatternData& data, const PatternMask& used)
   return times;
 }
 
-// From one of these to the next, about the stretch of time; the median, so that a pause at its end counts for nothing.
+// Interval of these times around a segment; the median, so that a pause at its end does not count.
 double interval_about(const std::vector<double>& times, double begin_s, double end_s) {
   const auto first = times.begin();
   const auto at = [&](double t) { return std::lower_bound(first, times.end(), t) - first; };
@@ -117,7 +117,8 @@ double interval_about(const std::vector<double>& times, double begin_s, double e
   return intervals.empty() ? 0 : median(std::move(intervals));
 }
 
-// The gain that chance exceeds in one of `tests` with six degrees of freedom once in a hundred times.
+// The gain that noise exceeds in one of `tests` tests, with six degrees of freedom each, once in a
+// hundred times.
 double beyond_chance(int tests) {
   const double probability = 0.01 / std::max(1, tests);
   double x = 20;
@@ -144,7 +145,7 @@ KnotScore score_knots(const PatternData& data, const PatternMask& used, const Pa
     gain[static_cast<std::size_t>(curve.segment_at(all[i].time_s))] +=
         fine.gain[i] - coarse.gain[i];
   }
-  constexpr int kLeastObservations = 12;  // of a segment: twice what its new knot adds
+  constexpr int kLeastObservations = 12;  // in a segment: twice what its new knot adds
   std::vector<char> can(segments, 0);
   const std::vector<double> times = times_used(data, used);
   KnotScore score;

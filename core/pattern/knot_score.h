@@ -1,10 +1,11 @@
 #pragma once
-// Does the pose curve need more knots, and where? A score test: halve segments in mind, and ask the residuals at hand by how
-// much the sum of their squares would fall (one Gauss-Newton step of the curve alone, the lens held). Each new knot adds six
-// unknowns, so pure noise gives chi-square with six degrees of freedom a segment: more says that the motion is not followed.
-// It sharpens (Oth, section 4.2), whose test of a segment's whole cost drowns a bias of every residual in the noise of all of
-// them; and it ends, since a segment is only halved where half is at least the shortest useful length: beyond two knots a
-// frame the curve follows the noise and the line delay's sigma collapses.
+// score_knots(): whether and where the pose curve needs more knots. A score test: by how much would
+// the sum of squared residuals fall if segments were halved (one Gauss-Newton step of the curve
+// alone, the lens held)? Each knot adds six unknowns, so pure noise gives a chi-square of six
+// degrees of freedom a segment. More means that the curve does not follow the motion. Sharper than
+// (Oth, section 4.2), which tests a segment's whole cost: there noise drowns a bias of every
+// residual. It ends, as halves have a least length: beyond two knots a frame the curve follows
+// noise, and the line delay's sigma collapses.
 
 #include <vector>
 
@@ -14,23 +15,23 @@ namespace alidade::internal {
 
 struct KnotScoreOptions {
   double sigma_px = 1;  // of an observation's coordinate
-  double shortest_frames =
-      0.5;  // no half may be shorter, counted in frames that show the pattern there
+  // Least length of a half, in frames that show the pattern there.
+  double shortest_frames = 0.5;
 };
 
 struct KnotScore {
   std::vector<int> split;    // segments to halve, in increasing order
-  double gain = 0;           // of squared residuals in units of sigma, were all that can be halved
+  double gain = 0;           // of squared residuals in sigma^2, if all that can be were halved
   double expected = 0;       // from noise alone
-  double gain_of_short = 0;  // were those halved that are too short for it
+  double gain_of_short = 0;  // if those that are too short for it were halved
   double expected_of_short = 0;
 };
 
 [[nodiscard]] KnotScore score_knots(const PatternData& data, const PatternMask& used,
                                     const PatternState& state, const KnotScoreOptions& options);
 
-// sigma of an observation's coordinate, px: what one step of a curve with a knot a frame leaves, whatever the knots of the
-// state's own curve do not follow.
+// sigma of an observation's coordinate, px: what one step of a curve with one knot a frame leaves.
+// It does not depend on motion that the state's own curve does not follow.
 [[nodiscard]] double observation_noise(const PatternData& data, const PatternMask& used,
                                        const PatternState& state, double frame_interval_s);
 

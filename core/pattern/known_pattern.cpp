@@ -33,7 +33,7 @@ struct Unit {
 };
 constexpr std::array<Unit, 4> kUnits = {{{"mm", 1e-3}, {"cm", 1e-2}, {"m", 1}, {"in", 0.0254}}};
 
-// A number and what stands behind it, in the classic locale.
+// A number and the text after it, in the classic locale.
 std::optional<double> leading_number(const std::string& text, std::string* rest) {
   std::istringstream in(text);
   in.imbue(std::locale::classic());
@@ -66,7 +66,7 @@ bool counts_of(const std::string& text, int* columns, int* rows) {
   return true;
 }
 
-// Also as OpenCV spells it: DICT_4X4_50.
+// Accepts OpenCV's spelling as well: DICT_4X4_50.
 std::optional<int> dictionary_of(std::string text) {
   for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   if (text.rfind("dict_", 0) == 0) text.erase(0, 5);
@@ -76,7 +76,8 @@ std::optional<int> dictionary_of(std::string text) {
   return std::nullopt;
 }
 
-// What stands behind a square's side: the marker's, and the dictionary. What is wrong about it, or nothing.
+// Reads what follows a square's side: the marker's side and the dictionary. Returns what is wrong,
+// or an empty text.
 std::string read_markers(const std::vector<std::string>& parts, KnownPattern* pattern) {
   const std::optional<double> marker = length_of(parts[3]);
   if (!marker) return "'" + parts[3] + "' is not a marker's length with its unit, mm, cm, m or in";
@@ -139,7 +140,8 @@ bool KnownPattern::is_symmetric() const {
   switch (kind) {
     case PatternKind::kChessboard:
     case PatternKind::kSymmetricCircles:
-      return true;  // a chessboard's colours tell in half of the cases, but not OpenCV
+      // A chessboard's colours show the half turn for half of all boards, but not to OpenCV.
+      return true;
     case PatternKind::kAsymmetricCircles:
       return rows % 2 == 1;
     case PatternKind::kAprilGrid:

@@ -1,11 +1,12 @@
 #pragma once
-// The lens of a camera before a known pattern: perspective with radial and tangential distortion (OpenCV's k1 k2 p1 p2),
-// camera frame RDF.
+// The lens of a camera that sees a known pattern: perspective with radial and tangential distortion
+// (OpenCV's k1 k2 p1 p2). Camera frame RDF.
 //   x = (p_1, p_2) / p_3,   r^2 = |x|^2,   s = 1 + k1 r^2 + k2 r^4
 //   x_d = s x + (2 p1 x_1 x_2 + p2 (r^2 + 2 x_1^2),  p1 (r^2 + 2 x_2^2) + 2 p2 x_1 x_2)
 //   u = (f_u x_d1 + c_u, f_v x_d2 + c_v)
-// Pixels are continuous, the centre of the top-left pixel is at (0.5, 0.5): c_u, c_v are OpenCV's plus 0.5. With f_u = f_v,
-// the centre in the middle and k2 = p1 = p2 = 0 it is the camera of core/model/camera.h. Row v is exposed at t0 + v * line_delay.
+// Pixels are continuous; the centre of the top-left pixel is at (0.5, 0.5), so c_u, c_v are
+// OpenCV's plus 0.5. Row v is exposed at t0 + v * line_delay. With f_u = f_v, a centre in the
+// middle and k2 = p1 = p2 = 0 it is the camera of core/model/camera.h.
 
 #include <array>
 
@@ -39,18 +40,18 @@ inline constexpr std::array<const char*, kLensParameterCount> kLensParameterName
 
 [[nodiscard]] constexpr int index(LensParameter parameter) { return static_cast<int>(parameter); }
 
-// By LensParameter.
+// Indexed by LensParameter.
 using LensVector = Matrix<double, kLensParameterCount, 1>;
 using LensMatrix = Matrix<double, kLensParameterCount, kLensParameterCount>;
 
-// What is known of a lens beside the data.
+// Knowledge of a lens besides the data.
 struct LensKnowledge {
   std::array<bool, kLensParameterCount> fixed = {};  // to the mean
   LensVector mean = LensVector::Zero();
   LensMatrix information = LensMatrix::Zero();  // inverse covariance; 0: nothing is known
 };
 
-// p_c: m, or any length. J_u_lens leaves the line delay's column 0. Outputs are written with kOk only.
+// p_c: m, or any unit. J_u_lens is 0 in the line delay's column. Outputs are written with kOk only.
 [[nodiscard]] inline ProjectionStatus project_lens(
     const LensVector& lens, const Vector3<double>& p_c, Vector2<double>* u,
     Matrix<double, 2, 3>* J_u_p = nullptr,
@@ -66,7 +67,7 @@ struct LensKnowledge {
   const double x = p_c.x() / p_c.z();
   const double y = p_c.y() / p_c.z();
   const double r2 = x * x + y * y;
-  // Beyond, the radial term turns back and two directions share a pixel.
+  // Beyond this the radial term turns back, and two directions share a pixel.
   if (1 + r2 * (3 * k1 + 5 * k2 * r2) <= 0) return ProjectionStatus::kBeyondDistortionLimit;
   const double s = 1 + r2 * (k1 + k2 * r2);
   const double x_d = s * x + 2 * p1 * x * y + p2 * (r2 + 2 * x * x);

@@ -23,7 +23,8 @@ struct GridPoint {
   Vector3<double> d;    // camera frame, z = 1
 };
 
-// The direction that the lens shows at u, by Newton's method from the middle on. False: there is none.
+// Sets the direction that the lens shows at u, by Newton's method from the direction without
+// distortion. False: there is none.
 bool unproject_lens(const LensVector& lens, GridPoint* point) {
   constexpr int kSteps = 30;
   Vector3<double> d((point->u.x() - lens[index(LensParameter::kCentreU)]) /
@@ -31,7 +32,7 @@ bool unproject_lens(const LensVector& lens, GridPoint* point) {
                     (point->u.y() - lens[index(LensParameter::kCentreV)]) /
                         lens[index(LensParameter::kFocalLengthV)],
                     1);
-  // Beyond where the radial terms turn back it starts from half as far.
+  // Where the radial terms turn back, it continues from half as far.
   Vector2<double> u;
   Matrix<double, 2, 3> J;
   for (int step = 0; step < kSteps; ++step) {
@@ -68,7 +69,7 @@ struct Fit {
   double rms_px = 0;
 };
 
-// Gauss-Newton over the points of the part. Empty: too few, or it does not converge.
+// Gauss-Newton over the points of a part. Empty: too few points, or no convergence.
 std::optional<Fit> fit(const std::vector<GridPoint>& part, const Camera<double>& start) {
   constexpr int kSteps = 20;
   constexpr std::size_t kFewest = 40;
@@ -109,10 +110,10 @@ std::optional<Fit> fit(const std::vector<GridPoint>& part, const Camera<double>&
   return std::nullopt;
 }
 
-// Where landmarks may be in place of everywhere.
+// Parts of the image in which landmarks may lie.
 using Part = std::function<bool(const GridPoint&)>;
 std::array<Part, 6> parts() {
-  constexpr double kInner = 0.64;  // of an ellipse of half the image's area, half axes squared
+  constexpr double kInner = 0.64;  // of an ellipse of half the image's area: half axes squared
   const auto radius = [](const GridPoint& p) { return p.x * p.x + p.y * p.y; };
   return {[radius](const GridPoint& p) { return radius(p) < kInner; },
           [radius](const GridPoint& p) { return radius(p) >= kInner; },
@@ -126,7 +127,7 @@ Vector3<double> parameters_of(const Camera<double>& camera) {
   return {camera.focal_length, camera.aspect, camera.radial_distortion};
 }
 
-// Over the whole image; its grid is left in *grid.
+// The fit over the whole image, and its grid.
 std::optional<Fit> fit_lens(const LensVector& lens, int width, int height,
                             std::vector<GridPoint>* grid) {
   *grid = grid_over(lens, width, height);
@@ -136,7 +137,7 @@ std::optional<Fit> fit_lens(const LensVector& lens, int width, int height,
                      lens[index(LensParameter::kK1)], width, height});
 }
 
-// How far a parameter is moved for a derivative: little of the image's size.
+// Step of a parameter for its numeric derivative: a small change in the image.
 double step_of(const LensVector& lens, int parameter) {
   constexpr double kStep_px = 1e-3;
   const double f = lens[index(LensParameter::kFocalLengthU)];

@@ -15,8 +15,8 @@ ProjectionStatus project_moving(const PoseCurve& curve, int segment, const Contr
                                 const Vector3<double>& p, double row_guess,
                                 MovingProjection* projection, bool with_jacobians) {
   constexpr int kMaxSteps = 12;
-  constexpr double kSteady = 1e-3;      // px, within which the image's motion is a straight one
-  constexpr double kSlopeLimit = 0.98;  // rows that the image moves per row that is read
+  constexpr double kSteady = 1e-3;      // px; within it the image's motion is taken as straight
+  constexpr double kSlopeLimit = 0.98;  // rows that the image moves per row read
   const double line_delay = lens[index(LensParameter::kLineDelay)];
   double row = row_guess;
   for (int step = 0; step < kMaxSteps; ++step) {
@@ -45,7 +45,7 @@ ProjectionStatus project_moving(const PoseCurve& curve, int segment, const Contr
     projection->time_s = frame_time_s + row * line_delay;
     projection->basis = basis;
     if (with_jacobians) {
-      // A change of the row by what changes elsewhere, then of the pixel by the row.
+      // How other changes move the row, and how the row moves the pixel.
       Matrix2<double> A = Matrix2<double>::Identity();
       A.col(1) += u_rate * (line_delay / (1 - slope));
       J_u_lens.col(index(LensParameter::kLineDelay)) = u_rate * row;

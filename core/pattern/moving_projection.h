@@ -1,9 +1,10 @@
 #pragma once
-// A point of the pattern as a rolling shutter sees it while the camera moves: its row v decides when it is seen, and when it
-// is seen decides the row.
-//   v = project(p_camera(t_frame + v * line_delay))_v                                        (Oth 6, solved for v)
-// With the row that the model predicts in place of the measured one, the residual's covariance is the detection's own, and
-// (Oth 18 to 21) is not needed. Jacobians follow from the implicit function theorem.
+// A point of the pattern as a rolling shutter sees it while the camera moves. Its row v determines
+// when it is seen, and the time determines the row:
+//   v = project(p_camera(t_frame + v * line_delay))_v                  (Oth 6, solved for v)
+// This uses the predicted row, not the measured one. So the residual's covariance is the
+// detection's own, and (Oth 18 to 21) is not needed. Jacobians follow from the implicit function
+// theorem.
 
 #include <cstddef>
 
@@ -17,8 +18,8 @@ namespace alidade {
 struct MovingProjection {
   Vector2<double> u;                                // px
   double time_s = 0;                                // when the point's row was exposed
-  SplineBasis basis;                                // of the pose then
-  Matrix<double, 2, 6> J_u_x;                       // by the pose then
+  SplineBasis basis;                                // of the pose at time_s
+  Matrix<double, 2, 6> J_u_x;                       // by the pose at time_s
   Matrix<double, 2, kLensParameterCount> J_u_lens;  // line delay included
 };
 
@@ -27,16 +28,17 @@ using ControlPoints = Matrix<double, 6, 4>;
 
 [[nodiscard]] ControlPoints control_points_of(const PoseCurve& curve, int segment);
 
-// row_guess: px, where the solution for the row begins. Only by the segment's polynomials, also beyond its ends: what a
-// solver's parameter blocks are does not change while it steps. kNoRow: the image moves as fast as the read-out, or
-// the row was not found. Outputs are written with kOk only.
+// row_guess: px, start of the iteration for the row. Uses only the segment's polynomials, even
+// beyond its ends, so that a solver's parameter blocks do not change while it steps. kNoRow: the
+// image moves as fast as the read-out, or no row was found. Outputs are written with kOk only.
 [[nodiscard]] ProjectionStatus project_moving(const PoseCurve& curve, int segment,
                                               const ControlPoints& points, const LensVector& lens,
                                               double frame_time_s, const Vector3<double>& p,
                                               double row_guess, MovingProjection* projection,
                                               bool with_jacobians);
 
-// use(frame, observation, projection), both as indices, for each observation that the model sees, in the data's order.
+// Calls use(frame, observation, projection), the first two as indices, for each observation that
+// can be projected, in the data's order.
 template <class Use>
 void for_each_projection(const PatternData& data, const LensVector& lens, const PoseCurve& curve,
                          bool with_jacobians, Use use) {

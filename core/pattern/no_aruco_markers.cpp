@@ -1,4 +1,4 @@
-// Of a build that has not found opencv_aruco: parse_pattern() refuses the patterns that would need more.
+// For a build without opencv_aruco: parse_pattern() refuses the patterns that need it.
 
 #include "core/pattern/aruco_markers.h"
 

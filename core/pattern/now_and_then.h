@@ -1,12 +1,13 @@
 #pragma once
-// For what takes long and rarely helps: light and distance change slowly, so that what did not help in the last images is tried in
-// some of the next ones only.
+// NowAndThen: skips an expensive step that rarely helps. Light and distance change slowly, so a
+// step that did not help in the last images is tried in some of the next ones only.
 
 namespace alidade::internal {
 
 class NowAndThen {
  public:
-  // find: is what was looked for there? False without looking, in most images after some in vain.
+  // find: looks for something and returns whether it is there. After four images in vain it is
+  // called in every eighth one only, and the result is false without looking.
   template <class Find>
   bool operator()(const Find& find) {
     constexpr int kPatience = 4;

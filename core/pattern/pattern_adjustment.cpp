@@ -17,7 +17,7 @@
 namespace alidade::internal {
 namespace {
 
-constexpr int kLensBlock = 4;  // of a cost's parameter blocks, behind the four control points
+constexpr int kLensBlock = 4;  // index of the lens's parameter block, after four control points
 
 ControlPoints points_of(double const* const* parameters) {
   ControlPoints points;
@@ -25,9 +25,9 @@ ControlPoints points_of(double const* const* parameters) {
   return points;
 }
 
-// Residuals of one frame's observations whose rows were exposed in one segment: few large blocks are several times
-// faster than one a point. Each observation is made robust by itself: r w(s), s = |r|^2, with (r w)^2 = Cauchy's
-// c^2 log(1 + s / c^2).
+// Residuals of one frame's observations whose rows were exposed in one segment. Few large blocks
+// are several times faster than one for each point. Each observation is made robust by itself: r
+// w(s), s = |r|^2, with (r w)^2 = Cauchy's c^2 log(1 + s / c^2).
 class FrameCost : public ceres::CostFunction {
  public:
   FrameCost(const PatternData* data, const PoseCurve* curve, int frame, int segment,
@@ -102,7 +102,8 @@ class FrameCost : public ceres::CostFunction {
   double robust_scale_;
 };
 
-// Gauss's quadrature over a segment: two points, exact for the square of an acceleration, which is linear there.
+// Gauss quadrature over a segment with two points: exact for the square of an acceleration, which
+// is linear there.
 struct Moment {
   double time_s, weight_s;
 };
@@ -113,7 +114,7 @@ std::array<Moment, 2> moments_of(const PoseCurve& curve, int segment) {
   return {{{begin + length * (0.5 - off), length / 2}, {begin + length * (0.5 + off), length / 2}}};
 }
 
-// The integral of the squared accelerations over a segment.
+// Integral of the squared accelerations over a segment.
 class AccelerationCost : public ceres::SizedCostFunction<12, 6, 6, 6, 6> {
  public:
   AccelerationCost(const PoseCurve& curve, int segment, const PatternAdjustmentOptions& options) {
@@ -154,7 +155,7 @@ class AccelerationCost : public ceres::SizedCostFunction<12, 6, 6, 6, 6> {
 class KnowledgeCost : public ceres::SizedCostFunction<kLensParameterCount, kLensParameterCount> {
  public:
   explicit KnowledgeCost(const LensKnowledge& knowledge) : mean_(knowledge.mean) {
-    // L^T (lens - mean), information = L L^T, which may be singular.
+    // Residual L^T (lens - mean) with information = L L^T, which may be singular.
     const Eigen::LDLT<LensMatrix> ldlt(knowledge.information);
     const LensVector root = ldlt.vectorD().cwiseMax(0.0).cwiseSqrt();
     LensMatrix L = ldlt.matrixL();
@@ -179,14 +180,16 @@ class KnowledgeCost : public ceres::SizedCostFunction<kLensParameterCount, kLens
   LensMatrix J_;
 };
 
+// Parameter and residual blocks of a problem.
 struct Blocks {
   std::vector<double*> points;  // control points
   double* lens = nullptr;
   std::vector<ceres::ResidualBlockId> observations;
-  std::vector<std::pair<int, int>> seen;  // frame and observation of each two residuals
+  std::vector<std::pair<int, int>> seen;  // frame and observation of each pair of residuals
 };
 
-// state's control points and lens are the parameter blocks; spline is a copy that stays as it is.
+// The state's control points and lens are the parameter blocks; spline is a copy that does not
+// change.
 Blocks build(const PatternData& data, const PatternMask& used, const LensKnowledge& knowledge,
              const PatternAdjustmentOptions& options, const PoseCurve& spline, PatternState* state,
              ceres::Problem* problem) {
@@ -247,14 +250,14 @@ Blocks build(const PatternData& data, const PatternMask& used, const LensKnowled
 
 using SparseRows = Eigen::Map<const Eigen::SparseMatrix<double, Eigen::RowMajor>>;
 
-// Groups of observations that may err together.
+// Groups of observations whose errors may be correlated.
 struct Groups {
   int count = 0;
-  std::vector<int> of;  // observation
+  std::vector<int> of;  // group of each observation
 };
 
-// Near each other in time: blur, corners at the same places in their pixels. In the same part of the image: what the lens's model
-// lacks. The same point: what the detector or the print has wrong about it.
+// By time: blur, corners at the same places within their pixels. By part of the image: what the
+// lens model lacks. By point: what detector or print get wrong there.
 std::array<Groups, 3> groups_of(const PatternData& data, const Blocks& blocks) {
   constexpr int kStretches = 100;
   const ImageCells cells(data.width, data.height);
@@ -273,9 +276,9 @@ std::array<Groups, 3> groups_of(const PatternData& data, const Blocks& blocks) {
   return groups;
 }
 
-// By how much the lens is less well known because detections err together, the data tell: each group of them pulls at it,
-// X^T J^T r, and the spread of these pulls is a second estimate of its variance that needs no independence within a group. Where that
-// is larger beyond chance, it counts.
+// Factor of the lens's sigmas due to correlated errors, from the data. Each group of observations
+// pulls at the lens by X^T J^T r. The spread of these pulls is a second estimate of the variance,
+// which needs no independence within a group. It counts where it is larger beyond chance.
 Eigen::VectorXd growth(const PatternData& data, const Blocks& blocks,
                        ceres::Problem::EvaluateOptions evaluate, const Eigen::MatrixXd& X,
                        const Eigen::MatrixXd& C, ceres::Problem* problem) {
@@ -330,7 +333,7 @@ AdjustmentEnd adjust_pattern(const PatternData& data, const PatternMask& used,
   solver.max_num_iterations = options.max_steps;
   solver.initial_trust_region_radius = options.first_radius;
   solver.function_tolerance = options.relative_decrease;
-  // Steps of a line delay, 1e-7 s, are nothing beside focal lengths of hundreds of pixels.
+  // A step of the line delay, 1e-7 s, is nothing beside focal lengths of hundreds of pixels.
   solver.parameter_tolerance = 0;
   solver.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
@@ -360,7 +363,7 @@ std::optional<LensCovariance> lens_covariance(const PatternData& data, const Pat
   if (!problem.Evaluate(evaluate, nullptr, nullptr, nullptr, &all)) return std::nullopt;
   const SparseRows J(all.num_rows, all.num_cols, static_cast<Eigen::Index>(all.values.size()),
                      all.rows.data(), all.cols.data(), all.values.data());
-  // Columns of one length: parameters are of very different units.
+  // Columns are scaled to one length, as the parameters' units differ widely.
   Eigen::VectorXd scale = Eigen::VectorXd::Zero(all.num_cols);
   for (std::size_t i = 0; i < all.values.size(); ++i)
     scale[all.cols[i]] += all.values[i] * all.values[i];
@@ -370,11 +373,12 @@ std::optional<LensCovariance> lens_covariance(const PatternData& data, const Pat
   const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Lower,
                               Eigen::NaturalOrdering<int>>
       ldlt(H);
-  // Natural order: the curve's band, then the lens, whose pivots are what the data say of it beside the curve.
+  // Natural order: the curve's band, then the lens. The lens's pivots are the information about it
+  // beside the curve.
   if (ldlt.info() != Eigen::Success || !(ldlt.vectorD().array() > 1e-13).all()) return std::nullopt;
   const auto lens_begin = all.num_cols - static_cast<int>(free.size());
-  Eigen::MatrixXd X(all.num_cols,
-                    static_cast<Eigen::Index>(free.size()));  // the lens's columns of the inverse
+  // The lens's columns of the inverse.
+  Eigen::MatrixXd X(all.num_cols, static_cast<Eigen::Index>(free.size()));
   for (std::size_t k = 0; k < free.size(); ++k) {
     Eigen::VectorXd unit = Eigen::VectorXd::Zero(all.num_cols);
     unit[lens_begin + static_cast<int>(k)] = scale[lens_begin + static_cast<int>(k)];

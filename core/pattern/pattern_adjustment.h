@@ -1,6 +1,7 @@
 #pragma once
-// The joint adjustment of pose curve and lens (Oth 7, with theta the whole lens): all observations, a weak prior on the
-// curve's accelerations (Oth, section 4.1), what is known of the lens before. By Ceres, with analytic Jacobians.
+// Joint adjustment of pose curve and lens (Oth 7, with theta the whole lens) to all observations,
+// with a weak prior on the curve's accelerations (Oth, section 4.1) and the prior knowledge of the
+// lens. By Ceres, with analytic Jacobians.
 
 #include <optional>
 #include <vector>
@@ -18,26 +19,26 @@ struct PatternState {
 
 struct PatternAdjustmentOptions {
   double sigma_px = 1;          // of an observation's coordinate
-  double robust_scale = 0;      // Cauchy's, in sigmas; 0: squares
+  double robust_scale = 0;      // of the Cauchy loss, in sigmas; 0: least squares
   double position_noise = 100;  // prior: power density of the accelerations, (m/s^2)^2 s
   double rotation_noise = 1e4;  // (rad/s^2)^2 s
   int max_steps = 30;
-  // Of the trust region to begin with, in Ceres's units: small far from the solution, so that no step runs wild; large near it,
-  // where it would only keep what the data hardly hold from getting there.
+  // First trust region, in Ceres's units. Small far from the solution, so that no step runs wild.
+  // Large near it, where a small one would keep weakly determined parameters from moving.
   double first_radius = 1e4;
-  double relative_decrease = 1e-7;  // of the cost, at which it ends
+  double relative_decrease = 1e-7;  // of the cost, at which the adjustment ends
 };
 
-// Over all of the curve, (m/s^2)^2 and (rad/s^2)^2.
+// Mean over the whole curve, (m/s^2)^2 and (rad/s^2)^2.
 [[nodiscard]] PoseVector mean_square_acceleration(const PoseCurve& curve);
 
-// Which observations take part, frame by frame as in the data.
+// Which observations are used, by frame and observation as in the data.
 using PatternMask = std::vector<std::vector<char>>;
 
 enum class AdjustmentEnd {
   kConverged,
-  kOutOfSteps,  // usable, and not at the minimum
-  kFailed,      // the solver found nothing that can be used
+  kOutOfSteps,  // usable, but not at the minimum
+  kFailed,      // no usable solution
 };
 
 [[nodiscard]] AdjustmentEnd adjust_pattern(const PatternData& data, const PatternMask& used,
@@ -46,9 +47,10 @@ enum class AdjustmentEnd {
                                            PatternState* state);
 
 struct LensCovariance {
-  LensMatrix independent =
-      LensMatrix::Zero();  // if detections err independently, by options.sigma_px
-  // Of each sigma, 1 or more: what stretches of time, parts of the image and single points pull harder than independent errors would.
+  // For independent errors of the detections with options.sigma_px.
+  LensMatrix independent = LensMatrix::Zero();
+  // Factor of each sigma, 1 or more: how much harder intervals of time, parts of the image and
+  // single points pull than independent errors would.
   LensVector growth = LensVector::Ones();
 
   [[nodiscard]] LensMatrix covariance() const {
@@ -56,7 +58,7 @@ struct LensCovariance {
   }
 };
 
-// With the curve free, at the state. Empty if what is not fixed is not determined.
+// At the state, with the curve free. Empty if a parameter that is not fixed is undetermined.
 [[nodiscard]] std::optional<LensCovariance> lens_covariance(const PatternData& data,
                                                             const PatternMask& used,
                                                             const LensKnowledge& knowledge,

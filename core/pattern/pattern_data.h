@@ -1,5 +1,5 @@
 #pragma once
-// What the calibration by a known pattern works on: where its points were seen, in which frame.
+// Input of the calibration by a known pattern: where its points were seen, in which frame.
 
 #include <vector>
 
@@ -10,21 +10,21 @@ namespace alidade {
 struct PatternObservation {
   int point = 0;      // index into PatternData::points_m
   Vector2<double> u;  // px, the centre of the top-left pixel is at (0.5, 0.5)
-  // Of a circle: u is its centroid less `beside`, px; radius: as measured, 0: no circle.
+  // For a circle, u is its centroid minus `beside` (px). radius_m: as measured; 0: no circle.
   Vector2<double> beside = Vector2<double>::Zero();
   double radius_m = 0;
 };
 
 struct PatternFrame {
-  double time_s = 0;  // exposure of row 0, of a steady clock, increasing
+  double time_s = 0;  // of row 0, on a steady clock; increasing
   std::vector<PatternObservation> observations;
 };
 
 struct PatternData {
   int width = 0;   // px
   int height = 0;  // px
-  std::vector<Vector3<double>>
-      points_m;  // pattern frame: x right, y down, z away from the viewer; z = 0 on a plane
+  // Pattern frame: x right, y down, z away from the viewer; z = 0 on a plane.
+  std::vector<Vector3<double>> points_m;
   std::vector<PatternFrame> frames;
 };
 

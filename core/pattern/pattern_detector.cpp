@@ -18,9 +18,9 @@ namespace alidade {
 namespace {
 
 constexpr double kSearchSmoothing_px = 1.2;
-constexpr double kLeastImageContrast = 20;  // grey levels, of an image with circles
+constexpr double kLeastImageContrast = 20;  // grey levels, over an image with circles
 
-// One threshold for the whole image, in milliseconds.
+// One threshold for the whole image; takes milliseconds.
 bool find_chessboard(const cv::Mat& image, const cv::Size& size,
                      std::vector<cv::Point2f>* corners) {
   // Noise makes thousands of quads, each of which costs time.
@@ -29,7 +29,8 @@ bool find_chessboard(const cv::Mat& image, const cv::Size& size,
   return cv::findChessboardCorners(smooth, size, *corners, cv::CALIB_CB_FAST_CHECK);
 }
 
-// Where that fails: thresholds that adapt to the light, in an image small enough that looking in vain does not take seconds.
+// Fallback: thresholds that adapt to the light, in an image so small that a vain search does not
+// take seconds.
 bool find_chessboard_in_any_light(const cv::Mat& image, const cv::Size& size,
                                   std::vector<cv::Point2f>* corners) {
   constexpr int kLargest_px = 400;
@@ -50,7 +51,7 @@ bool find_chessboard_in_any_light(const cv::Mat& image, const cv::Size& size,
   return true;
 }
 
-// low, high: the darkest and the brightest of it.
+// low, high: darkest and brightest grey level of the image.
 cv::Ptr<cv::SimpleBlobDetector> blob_detector(const cv::Mat& image, double low, double high,
                                               int circles) {
   cv::SimpleBlobDetector::Params params;
@@ -76,7 +77,7 @@ bool find_circles(const cv::Mat& image, const KnownPattern& pattern,
                              blob_detector(image, low, high, size.area()));
 }
 
-// In an image of half the size noise makes few blobs.
+// In an image of half the size noise makes fewer blobs.
 bool find_circles_in_half(const cv::Mat& image, const KnownPattern& pattern,
                           std::vector<cv::Point2f>* centres) {
   cv::Mat half;
@@ -149,7 +150,7 @@ PatternDetector::~PatternDetector() = default;
 std::vector<PatternObservation> PatternDetector::find(const std::uint8_t* luma, int width,
                                                       int height, std::ptrdiff_t stride) {
   std::vector<PatternObservation> observations;
-  // OpenCV's and libapriltag's windows do not fit into less, and neither says so.
+  // OpenCV's and libapriltag's windows need more pixels, and neither checks that.
   if (std::min(width, height) < kLeastImage_px) return observations;
   // OpenCV does not write to it.
   const cv::Mat image(height, width, CV_8UC1, const_cast<std::uint8_t*>(luma),
@@ -165,7 +166,7 @@ std::vector<PatternObservation> PatternDetector::find(const std::uint8_t* luma, 
       corners.clear();
     }
   } catch (const cv::Exception&) {
-    return observations;  // what it finds fault with holds no pattern
+    return observations;  // an image that makes OpenCV throw holds no pattern
   }
   for (std::size_t i = 0; i < corners.size(); ++i) {
     PatternObservation seen{points[i], {corners[i].x + 0.5, corners[i].y + 0.5}};

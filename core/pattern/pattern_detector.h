@@ -1,6 +1,7 @@
 #pragma once
-// Where the points of a known pattern are in an image: OpenCV's chessboards, circle grids and ChArUco boards, libapriltag's
-// tags, corners to a fraction of a pixel by OpenCV. One thread at a time.
+// PatternDetector: the points of a known pattern in an image. Chessboards, circle grids and ChArUco
+// boards by OpenCV, tags by libapriltag, corners refined to a fraction of a pixel. One thread at a
+// time.
 
 #include <cstddef>
 #include <cstdint>
@@ -15,18 +16,19 @@ namespace alidade {
 
 class PatternDetector {
  public:
-  static constexpr int kLeastImage_px = 32;  // a side of an image in which something can be found
+  static constexpr int kLeastImage_px = 32;  // smallest side of an image that is searched
 
   explicit PatternDetector(const KnownPattern& pattern);
   ~PatternDetector();
   PatternDetector(const PatternDetector&) = delete;
   PatternDetector& operator=(const PatternDetector&) = delete;
 
-  // 8-bit luma, row v at luma + v * stride. The observations in increasing order of their points; empty: not found.
+  // 8-bit luma, row v at luma + v * stride. The observations are ordered by point; empty if the
+  // pattern is not found.
   [[nodiscard]] std::vector<PatternObservation> find(const std::uint8_t* luma, int width,
                                                      int height, std::ptrdiff_t stride);
 
-  // One line, what was there in the pattern's place in the images so far; empty: nothing is known to be.
+  // One line: what the images so far showed in place of the pattern; empty if nothing is known.
   [[nodiscard]] std::string doubt() const;
 
  private:
@@ -34,8 +36,9 @@ class PatternDetector {
   std::unique_ptr<State> state_;
 };
 
-// Of a pattern that looks the same after half a turn each frame may have been named either way round: names each as the frame
-// before it, so that the camera's motion is one trajectory. What is longer than max_gap_s ago says nothing.
+// A pattern that looks the same after half a turn may be numbered either way in each frame. Numbers
+// each frame like the one before it, so that the camera's motion is continuous. Frames more than
+// max_gap_s apart are not compared.
 void follow_half_turns(const KnownPattern& pattern, double max_gap_s, PatternData* data);
 
 }  // namespace alidade

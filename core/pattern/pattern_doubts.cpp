@@ -9,8 +9,9 @@
 namespace alidade {
 namespace {
 
-// Between two frames in a row. A hand that moves the image by the pattern's own size from one frame to the next blurs it away.
-constexpr double kJump = 0.7;  // of the pattern's diagonal in the image
+// Between two consecutive frames. Motion by the pattern's own size within a frame would blur it
+// away.
+constexpr double kJump = 0.7;  // share of the pattern's diagonal in the image
 constexpr int kFewestJumps = 3;
 constexpr double kNextFrame = 1.5;  // intervals
 constexpr double kLongGap_s = 1;

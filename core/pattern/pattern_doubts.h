@@ -1,6 +1,7 @@
 #pragma once
-// What detections show of a video that makes a calibration worse or fail, as lines for a person: stretches without the pattern, and
-// a second pattern in view. Detections are those of steady times, half turns undone. Pure; allocates.
+// doubts_of(): what detections show of a video that makes a calibration worse or fail: gaps without
+// the pattern, and a second pattern in view. One line each, for a person. Expects steady times and
+// undone half turns. Pure; allocates.
 
 #include <string>
 #include <vector>

@@ -26,9 +26,9 @@ constexpr std::array<Paper, 6> kPapers = {{{"a4", 210, 297},
                                            {"a1", 594, 841},
                                            {"a0", 841, 1189},
                                            {"letter", 215.9, 279.4}}};
-constexpr double kMargin_mm = 5;   // that printers leave white
-constexpr double kNoSeam = 1.002;  // a hair wider, so that no seam shows between cells
-constexpr double kCircle = 0.5;    // a circle's radius, of half the least distance of two centres
+constexpr double kMargin_mm = 5;   // left white by printers
+constexpr double kNoSeam = 1.002;  // slightly wider, so that no seam shows between cells
+constexpr double kCircle = 0.5;    // radius, as a share of half the least distance of two centres
 
 struct Shapes {
   std::string svg;
@@ -49,7 +49,7 @@ struct Shapes {
 
 Shapes chessboard(const KnownPattern& pattern, double size_mm) {
   Shapes shapes;
-  // With a white square's room around.
+  // With room for a white square around.
   shapes.width_mm = (pattern.columns + 1) * size_mm;
   shapes.height_mm = (pattern.rows + 1) * size_mm;
   for (int row = 0; row <= pattern.rows; ++row) {
@@ -76,8 +76,8 @@ Shapes circles(const KnownPattern& pattern) {
   return shapes;
 }
 
-// As kalibr draws it: black borders of two cells, black squares beside each corner. around: also outside of the grid, where
-// detectors can do without them.
+// As kalibr draws it: black borders of two cells, black squares beside each corner. around: also
+// outside the grid, where detectors can do without them.
 Shapes april_grid(const KnownPattern& pattern, bool around) {
   constexpr int kCode = 6;  // cells a side
   constexpr int kBorder = 2;
@@ -172,7 +172,7 @@ Shapes shapes_of(const KnownPattern& pattern) {
   return circles(pattern);
 }
 
-// Width and height between its margins, mm; upright, or across if the pattern is wider than high.
+// Width and height between the margins, mm. Landscape if the pattern is wider than high.
 std::pair<double, double> room_on(const Paper& paper, const Shapes& shapes) {
   const double width = paper.width_mm - 2 * kMargin_mm;
   const double height = paper.height_mm - 2 * kMargin_mm;

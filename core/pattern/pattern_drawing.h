@@ -8,8 +8,8 @@
 
 namespace alidade {
 
-// paper: a4, a3, a2, a1, a0 or letter; landscape where the pattern is wider than high. Empty and one line in *error where the
-// paper is unknown or too small.
+// paper: a4, a3, a2, a1, a0 or letter; landscape if the pattern is wider than high. Empty and one
+// line in *error if the paper is unknown or too small.
 [[nodiscard]] std::optional<std::string> draw_pattern(const KnownPattern& pattern,
                                                       const std::string& paper, std::string* error);
 

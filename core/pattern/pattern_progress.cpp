@@ -16,13 +16,13 @@
 namespace alidade {
 namespace {
 
-constexpr double kRecent_s = 3;  // what somebody who is told to do better has just done
-constexpr double kTogether = 3;  // intervals between two frames that are taken for neighbours
+constexpr double kRecent_s = 3;  // the time that a person who gets advice looks back on
+constexpr double kTogether = 3;  // frame intervals; up to this two frames are consecutive
 constexpr std::size_t kLeastPoints = 6;
 constexpr std::size_t kViews = 80;   // for tilt and distance
-constexpr double kOutlying = 0.025;  // of the views to each side: poses of few or wrong points
+constexpr double kOutlying = 0.025;  // of the views on each side: poses of few or wrong points
 
-// Marks.
+// Limits.
 constexpr double kEnough_s = 20;
 constexpr double kUnseen_s = 1.5;
 constexpr double kSeldom = 0.5;
@@ -39,7 +39,7 @@ double quantile(std::vector<double> values, double part) {
   return *at;
 }
 
-// The frames of which a pose can be had, or as many of them, evenly chosen.
+// Frames that allow a pose, evenly thinned to kViews.
 PatternData some_views(const PatternData& data) {
   PatternData views;
   views.width = data.width;
@@ -54,7 +54,8 @@ PatternData some_views(const PatternData& data) {
   return views;
 }
 
-// By the views themselves, or as of most cameras where they do not tell it: tilt shows by how narrow the pattern is, whatever the lens.
+// From the views themselves, else a typical lens. Tilt shows by how narrow the pattern is, whatever
+// the lens.
 LensVector rough_lens(const PatternData& data) {
   constexpr double kShortest = 0.3;  // image widths
   constexpr double kLongest = 30;
@@ -139,7 +140,7 @@ void measure_motion(const PatternData& data, PatternProgress* progress) {
   progress->unfollowed = unfollowed_motion(data, end_s - kRecent_s);
 }
 
-// Where its point is, null if it is not seen. Observations are in the order of points.
+// The observation of a point in a frame; null if it is not seen. Observations are ordered by point.
 const PatternObservation* seen_in(const PatternFrame& frame, int point) {
   const auto at = std::lower_bound(
       frame.observations.begin(), frame.observations.end(), point,
@@ -147,7 +148,8 @@ const PatternObservation* seen_in(const PatternFrame& frame, int point) {
   return at == frame.observations.end() || at->point != point ? nullptr : &*at;
 }
 
-// From the cubic through the other four, px, median of the points that all five show; none without any.
+// Distance of the middle frame from the cubic through the other four: px, median of the points that
+// all five show. Nothing if there are none.
 std::optional<double> middle_misses(const std::array<const PatternFrame*, 5>& five) {
   std::array<double, 5> weight{};
   for (std::size_t i = 0; i < 5; ++i) {
@@ -184,7 +186,7 @@ std::string listed(const std::array<double, count>& values, double mark,
   return text;
 }
 
-// What is to be shown and was not.
+// Lines about what was not shown yet.
 std::vector<std::string> still_to_show(const PatternProgress& progress) {
   std::vector<std::string> lines;
   if (progress.extent < internal::kSmallExtent)
@@ -244,13 +246,13 @@ std::vector<std::string> advice_of(const PatternProgress& progress) {
                             "and keep it in view",
                             10 * std::round(10 * progress.found)));
   } else if (progress.unfollowed > kUnfollowed) {
-    // What a cubic through the frames around misses grows as the fourth power of the speed. In tens, so
-    // that the line is another only when it has changed.
+    // The error of a cubic through the frames around grows with the fourth power of the speed.
+    // Rounded to tens, so that the line changes only when the speed has.
     lines.push_back(internal::formatted(
         "move at %.0f %% of this speed or less, the image moves too far from one frame to the next",
         10 * std::max(1.0, std::floor(10 * std::pow(kUnfollowed / progress.unfollowed, 0.25)))));
   }
-  // Before it was seen at all nothing of the rest is of use.
+  // Other advice is of no use before the pattern was seen at all.
   if (progress.extent == 0) return lines;
   const std::vector<std::string> rest = still_to_show(progress);
   lines.insert(lines.end(), rest.begin(), rest.end());

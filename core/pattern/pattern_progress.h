@@ -1,8 +1,9 @@
 #pragma once
-// What a video of a known pattern has shown so far, while it is taken: is that enough for a calibration, and if not, what would
-// help? The marks are those beyond which simulated recordings give a lens and a line delay as sharp as a video of that length can
-// (test/core/pattern/pattern_progress_test). Times need not be steady. Pure; allocates; takes milliseconds, and a tenth of a second
-// for the views' tilt.
+// progress_of(): what a video of a known pattern has shown so far, while it is taken, whether that
+// is enough for a calibration, and what would help if not. The limits: beyond them simulated
+// recordings give lens and line delay as precisely as a video of that length can
+// (test/core/pattern/pattern_progress_test). Times need not be steady. Pure; allocates; takes
+// milliseconds, and a tenth of a second for the views' tilt.
 
 #include <array>
 #include <string>
@@ -13,31 +14,32 @@
 namespace alidade {
 
 struct PatternProgress {
-  double seen_s = 0;          // time over which the pattern was seen in one frame after the other
-  double unseen_s = 0;        // since it was last seen; never seen: since the first frame
-  double last_seen_s = 0;     // when that was, since the first frame
-  double found = 0;           // part of the last seconds' frames in which it was found
-  double extent = 0;          // as PatternViews
+  double seen_s = 0;          // time during which consecutive frames show the pattern
+  double unseen_s = 0;        // since it was last seen, or since the first frame
+  double last_seen_s = 0;     // when it was last seen, since the first frame
+  double found = 0;           // share of the last seconds' frames that show it
+  double extent = 0;          // as PatternViews::extent
   double speed = 0;           // of points in the image, image heights/s, root mean square
-  double unfollowed = 0;      // as unfollowed_motion, of the last seconds' frames
-  double distance_ratio = 1;  // farthest to nearest
-  std::array<double, 4>
-      tilt{};  // rad, by how much it was nearer by its left, right, upper, lower side
-  // Of each ninth of the image, row by row: the part of its cells in which points were seen.
+  double unfollowed = 0;      // unfollowed_motion() of the last seconds' frames
+  double distance_ratio = 1;  // farthest over nearest
+  // rad; how far its left, right, upper and lower side was nearer than the opposite one.
+  std::array<double, 4> tilt{};
+  // For each ninth of the image, row by row: the share of its cells in which points were seen.
   std::array<double, 9> covered{};
 };
 
 [[nodiscard]] PatternProgress progress_of(const PatternData& data);
 
-// By how much the points of the middle one of five frames lie from where the others say, were the motion a cubic in between: beyond some
-// pixels the frames do not follow the motion. Median of the fives with more than `since_s` as their first time, part of the image's
-// height; 0 without any.
+// How well frames follow the motion: the distance of the points in the middle one of five frames
+// from a cubic through the other four. Median over all fives that start after since_s, as a share
+// of the image's height; 0 if there is none. Beyond some pixels the frames do not follow the
+// motion.
 [[nodiscard]] double unfollowed_motion(const PatternData& data, double since_s);
 
-// What would help, one line each, what matters most first. Empty: all there is to show was shown.
+// Advice, one line each, most important first. Empty: everything was shown.
 [[nodiscard]] std::vector<std::string> advice_of(const PatternProgress& progress);
 
-// All was shown, for long enough, and in the last seconds not too fast.
+// Everything was shown for long enough, and the last seconds were not too fast.
 [[nodiscard]] bool is_enough(const PatternProgress& progress);
 
 }  // namespace alidade

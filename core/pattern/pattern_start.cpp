@@ -9,10 +9,10 @@
 namespace alidade::internal {
 namespace {
 
-// The least observations that give a pose which is not a guess.
+// Fewer observations give no reliable pose.
 constexpr std::size_t kLeastPoints = 6;
 
-// OpenCV's pixels have the centre of the top-left one at (0, 0).
+// OpenCV has the centre of the top-left pixel at (0, 0).
 cv::Point2d to_opencv(const Vector2<double>& u) { return {u.x() - 0.5, u.y() - 0.5}; }
 
 void points_of(const PatternData& data, const PatternFrame& frame, std::vector<cv::Point3f>* points,
@@ -25,7 +25,7 @@ void points_of(const PatternData& data, const PatternFrame& frame, std::vector<c
   }
 }
 
-// Mean motion of the points that two frames share, px/s; empty where they share too few.
+// Mean motion of the points that two frames share, px/s; empty if they share none.
 std::optional<double> speed_between(const PatternFrame& a, const PatternFrame& b) {
   double sum = 0;
   int count = 0;
@@ -41,7 +41,7 @@ std::optional<double> speed_between(const PatternFrame& a, const PatternFrame& b
   return sum / count / (b.time_s - a.time_s);
 }
 
-// The slowest frame of each of some stretches of time: still, and different from one another.
+// The slowest frame of each of kViews intervals: views that are still and differ from one another.
 std::vector<std::size_t> slow_views(const PatternData& data) {
   constexpr std::size_t kViews = 24;
   std::vector<std::size_t> chosen;
@@ -58,7 +58,7 @@ std::vector<std::size_t> slow_views(const PatternData& data) {
       if (next >= count) continue;
       const std::optional<double> speed = speed_between(frame, data.frames[next]);
       if (!speed) continue;
-      // A whole pattern is worth some motion.
+      // A frame with more of the pattern is preferred, even if it moves.
       const std::size_t seen = frame.observations.size();
       if (best == count || 10 * seen > 11 * most || (11 * seen > 10 * most && *speed < slowest)) {
         best = f;
@@ -101,7 +101,7 @@ std::optional<LensVector> start_lens(const PatternData& data, const LensKnowledg
   cv::Mat distortion_found = cv::Mat::zeros(5, 1, CV_64F);
   std::vector<cv::Mat> rotations;
   std::vector<cv::Mat> translations;
-  // Few unknowns: what a moving shutter bends must not be taken for a lens.
+  // Few unknowns, so that rolling-shutter distortion is not taken for a lens.
   constexpr int kFlags = cv::CALIB_FIX_K2 | cv::CALIB_FIX_K3 | cv::CALIB_ZERO_TANGENT_DIST |
                          cv::CALIB_FIX_PRINCIPAL_POINT | cv::CALIB_FIX_ASPECT_RATIO;
   try {
@@ -166,7 +166,7 @@ PoseCurve start_curve(const std::vector<FramePose>& poses, double spacing_s, dou
   PoseCurve curve(knots);
   curve.R_0 = poses[poses.size() / 2].R_pattern_from_camera;
 
-  // The rotation vectors that follow each other most closely (Oth 22).
+  // Chooses the rotation vectors that follow each other most closely (Oth 22).
   std::vector<PoseVector> values;
   for (const FramePose& pose : poses) {
     PoseVector x;
@@ -196,7 +196,7 @@ PoseCurve start_curve(const std::vector<FramePose>& poses, double spacing_s, dou
     add(basis.segment, basis.weight, 1);
     for (int k = 0; k < 4; ++k) g.row(basis.segment + k) += basis.weight[k] * values[i].transpose();
   }
-  // What holds the curve where the pattern was not seen, and no more.
+  // Just holds the curve where the pattern was not seen.
   const double spacing = (end - begin) / count;
   for (int s = 0; s < curve.segments(); ++s) {
     for (const double x : {0.0, 1.0}) {

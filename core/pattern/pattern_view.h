@@ -1,6 +1,6 @@
 #pragma once
-// How a camera sees a pattern from where it is: what the lens needs to be different from view to view. Camera frame RDF, pattern
-// frame as in pattern_data.h.
+// How a camera sees a pattern from one pose: tilt and distance, which must vary to determine the
+// lens. Camera frame RDF, pattern frame as in pattern_data.h.
 
 #include <cmath>
 #include <vector>
@@ -10,12 +10,13 @@
 namespace alidade {
 
 struct PatternView {
-  // rad, of the pattern's plane to the image's: right side nearer (positive) or left, lower side nearer or upper.
+  // rad, of the pattern's plane against the image's. x: right side nearer (positive) or left; y:
+  // lower side nearer or upper.
   Vector2<double> tilt = Vector2<double>::Zero();
   double distance_m = 0;  // from the optical centre to the pattern's middle
 };
 
-// centre: the optical centre, m, pattern frame; middle: of the pattern's points, m.
+// centre: the optical centre, m, pattern frame. middle: of the pattern's points, m.
 [[nodiscard]] inline PatternView pattern_view(const Matrix3<double>& R_pattern_from_camera,
                                               const Vector3<double>& centre,
                                               const Vector3<double>& middle) {

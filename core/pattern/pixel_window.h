@@ -1,12 +1,12 @@
 #pragma once
-// The pixels about a place in an image, OpenCV's.
+// Windows of pixels around a place in an image, in OpenCV's pixels.
 
 #include <cmath>
 #include <opencv2/core.hpp>
 
 namespace alidade::internal {
 
-// Those whose centres are no farther from it than half_width and half_height, px.
+// Pixels whose centres are within half_width and half_height (px) of the place.
 [[nodiscard]] inline cv::Rect pixels_about(const cv::Point2d& place, double half_width,
                                            double half_height) {
   const cv::Point low(static_cast<int>(std::ceil(place.x - half_width)),

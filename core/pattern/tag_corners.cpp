@@ -16,25 +16,27 @@ namespace alidade::internal {
 namespace {
 
 constexpr int kSteps = 2;
-constexpr double kReach =
-    0.2;  // of the window, of a tag's side: it holds the border, and what is next to it
+// Half the window, as a share of a tag's side: it holds the border and what is next to it.
+constexpr double kReach = 0.2;
 constexpr double kLeastReach_px = 2;
-constexpr double kOffNextTag_px = 1.2;  // whose blurred edge the window leaves out
+constexpr double kOffNextTag_px = 1.2;  // kept from the next tag, whose edge is blurred
 constexpr double kStartBlur_px = 0.8;
 constexpr double kLeastBlur_px = 0.4;
 constexpr double kLargestBlur_px = 4;
-constexpr double kBlurPrior = 0.3;       // standard deviation of a step, of the blur
-constexpr double kNoise = 3;             // grey levels, beside that prior
-constexpr double kLeastExplained = 0.7;  // of the window's variance
+constexpr double kBlurPrior = 0.3;       // standard deviation of a step, as a share of the blur
+constexpr double kNoise = 3;             // grey levels, weighed against that prior
+constexpr double kLeastExplained = 0.7;  // share of the window's variance
 constexpr double kLeastCell_px = 0.5;
-constexpr double kLargestShift = 0.0625;  // in a step, of a tag's side
+constexpr double kLargestShift = 0.0625;  // in one step, as a share of a tag's side
 constexpr int kUnknowns = 6;              // brightness, contrast, position, blur along both axes
 
-// Cells from a corner inwards: outside, the border, the first of the code, the second and all behind it.
+// Intervals of cells from a corner inwards: outside, border, first cell of the code, second cell
+// and all behind it.
 constexpr int kIntervals = 4;
 using Weights = Vector4<double>;
 
-// Integral and density of the normal distribution, from a table: some hundred thousand of each are asked for an image.
+// Integral and density of the normal distribution, from a table: an image needs some hundred
+// thousand of each.
 class NormalDistribution {
  public:
   NormalDistribution() {
@@ -62,11 +64,12 @@ class NormalDistribution {
 
 struct Profile {
   Weights share;  // of the intervals at a place, blurred
-  Weights rate;   // by the place
+  Weights rate;   // derivative of share by the place
+  // Derivative of share by the blur.
   Weights by_blur;
 };
 
-// place, blur, border: cells.
+// place, blur, border: in cells.
 Profile profile(double place, double blur, int border) {
   static const NormalDistribution normal;
   const std::array<int, kIntervals - 1> ends = {0, border, border + 1};
@@ -98,10 +101,10 @@ struct Blur {
   double x = kStartBlur_px, y = kStartBlur_px;  // px, across edges along the tag's columns and rows
 };
 
-// The tag's cells about one of its corners, inwards positive.
+// The tag's cells around one of its corners; inwards is positive.
 class CornerView {
  public:
-  // square: a black one touches it from outside. origin: the corner, in cells.
+  // square: whether a black square touches the corner from outside. origin: the corner, in cells.
   CornerView(const TagFace& face, bool square, const cv::Matx33d& cells_from_image,
              const cv::Point2d& corner, const cv::Point2d& origin)
       : cells_from_image_(cells_from_image),
@@ -126,16 +129,16 @@ class CornerView {
     return {inward_.x() * (p[0] / p[2] - origin_.x), inward_.y() * (p[1] / p[2] - origin_.y)};
   }
 
-  // Across edges.
+  // px of a cell, across edges.
   [[nodiscard]] const Vector2<double>& cell_px() const { return cell_px_; }
   [[nodiscard]] const Matrix2<double>& cells_by_px() const { return J_; }
-  // By row, by column, of the intervals.
+  // White intervals by row and column.
   [[nodiscard]] const Matrix4<double>& white() const { return white_; }
   [[nodiscard]] int border() const { return border_; }
   [[nodiscard]] int side() const { return side_; }
 
  private:
-  // Of the intervals.
+  // For an interval in row and column.
   [[nodiscard]] bool is_white(const TagFace& face, bool square, int row, int column) const {
     if (row == 0 && column == 0) return !square;
     if (row == 0 || column == 0) return true;
@@ -197,7 +200,7 @@ bool fit(const cv::Mat& image, const CornerView& view, const cv::Point2d& corner
   }
   if (count < 2 * kUnknowns) return false;
   const double variance = squares - sum * sum / count;
-  // In units of the contrast, which is not known before.
+  // In units of the contrast, which is not known in advance.
   const double prior = kNoise * kNoise * count / std::max(1.0, 4 * variance);
   N(4, 4) += prior / std::pow(kBlurPrior * blur.x, 2);
   N(5, 5) += prior / std::pow(kBlurPrior * blur.y, 2);

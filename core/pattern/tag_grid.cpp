@@ -14,25 +14,28 @@
 namespace alidade::internal {
 namespace {
 
-// Of 36 bits two codes of the family differ in 11: another tag's correlation is at most 1 - 22 / 36.
+// Two codes of the family differ in at least 11 of 36 bits: another tag's correlation is at most
+// 1 - 22 / 36.
 constexpr double kLeastCorrelation = 0.6;
 constexpr double kLeastTagContrast = 5;  // grey levels, standard deviation over the bits
-// A window that holds a second corner of a square, or of the code, pulls there.
+// A window that holds a second corner, of a square or of the code, pulls towards it.
 constexpr double kWindowInBorder = 0.9;
 constexpr double kWindowInGap = 0.6;
-// Gradients by differences are wrong where edges are sharper than pixels; more would mix the code's cells in.
+// Gradients by differences are wrong at edges sharper than a pixel. More smoothing would mix in the
+// code's cells.
 constexpr double kSmoothing_px = 0.5;
 constexpr int kLeastTagWindow_px = 2;
 constexpr int kLargestTagWindow_px = 11;
-constexpr double kLargestChange = 0.09;  // of a corner by its refinement, of a side
-// How far a lens bends what the neighbours expect.
+constexpr double kLargestChange = 0.09;  // of a corner by its refinement, as a share of a side
+// How far a lens bends the neighbours' prediction.
 constexpr double kFits_px = 1;
-constexpr double kFits = 0.04;          // of a side
+constexpr double kFits = 0.04;          // share of a side
 constexpr std::size_t kNeighbours = 4;  // whose homography predicts a tag
-constexpr float kEnlarged = 2;          // where white grows by a pixel, it parts tags from squares
-constexpr int kBorders = 2;             // that are looked for: of one cell, of two
-constexpr int kMostWrongBits = 1;       // of a code
-// What is known of the squares: so many more corners with one than without, or the other way round.
+constexpr float kEnlarged = 2;          // white then grows by a pixel: it parts tags from squares
+constexpr int kBorders = 2;             // border widths to look for: one cell, two cells
+constexpr int kMostWrongBits = 1;       // in a code
+// Lead of corners with a square over those without, or the reverse, beyond which the layout is
+// known.
 constexpr int kSureOfSquares = 12;
 constexpr double kLeastEvidence = 0.05;
 
@@ -43,7 +46,7 @@ double shortest_side(const TagGrid::Corners& corners) {
   return shortest;
 }
 
-// tag36h11_create()'s place of a code's first cell, in a tag's cells.
+// The place of a code's first cell in tag36h11_create(), in cells of the tag.
 constexpr std::uint32_t kFamilyBorder = 1;
 
 TagFace face_of(const apriltag_family_t& family, int tag) {
@@ -55,12 +58,13 @@ TagFace face_of(const apriltag_family_t& family, int tag) {
   return face;
 }
 
-// Of a tag's edges in this image, grey levels. Less is noise, which costs most of the time.
+// Least contrast of a tag's edges in this image, grey levels. Lower is noise, which costs most of
+// the time.
 int least_contrast(const cv::Mat& image) {
   constexpr int kUsual = 20;
   constexpr int kLeast = 6;
   constexpr double kOfRange = 0.3;
-  constexpr double kBeyond = 0.002;  // of the pixels, may be glints
+  constexpr double kBeyond = 0.002;  // share of the pixels that may be glints
   std::array<int, 256> counts{};
   std::for_each(image.begin<std::uint8_t>(), image.end<std::uint8_t>(),
                 [&](std::uint8_t grey) { ++counts[grey]; });
@@ -87,7 +91,7 @@ struct TagGrid::Library {
   struct FamilyEnd {
     void operator()(apriltag_family_t* ended) const { tag36h11_destroy(ended); }
   };
-  // By border, less one.
+  // By border - 1.
   std::array<std::unique_ptr<apriltag_family_t, FamilyEnd>, kBorders> families;
   std::unique_ptr<apriltag_detector_t, DetectorEnd> detector{apriltag_detector_create()};
 };
@@ -237,7 +241,7 @@ TagGrid::Corners TagGrid::predicted(int tag, bool robust) const {
 }
 
 void TagGrid::grow(const cv::Mat& image) {
-  // A tag that was not there may be once more of its neighbours tell where.
+  // A tag that was not found may be, once more neighbours predict it.
   constexpr int kRounds = 12;
   bool grown = true;
   for (int round = 0; grown && round < kRounds; ++round) {

@@ -1,9 +1,11 @@
 #pragma once
-// The tags of an AprilGrid in an image, with a black border of one cell, as libapriltag prints them, or two, as kalibr does, and with
-// or without the black squares that kalibr prints where gaps cross: what is seen decides. Squares touch the tags' corners: a tag's
-// outline is then no quad of its own, and libapriltag finds a part of the tags. The grid grows from these: corners of the neighbours
-// are predicted by the homography of the nearest known tags, refined, and taken if the neighbour's code is really there. In a video
-// the tags of the image before, moved on, are the first guess, which saves most searches. One thread at a time.
+// TagGrid: the tags of an AprilGrid in an image. Tags may have a black border of one cell
+// (libapriltag) or two (kalibr), with or without kalibr's black squares where gaps cross: the
+// images decide. Squares touch the tags' corners. A tag's outline is then no separate quad, and
+// libapriltag finds only some tags. The grid grows from these: the homography of the nearest known
+// tags predicts a neighbour's corners, which are refined and accepted if its code is there. In a
+// video the tags of the previous images, extrapolated, are the first guess, which saves most
+// searches. One thread at a time.
 
 #include <array>
 #include <cstddef>
@@ -26,43 +28,45 @@ class TagGrid {
   TagGrid(const TagGrid&) = delete;
   TagGrid& operator=(const TagGrid&) = delete;
 
-  // 8-bit grey. By tag, the four corners in the order of KnownPattern::points_m, OpenCV's pixels; empty: not found. A grid that
-  // is another than the pattern says is not found.
+  // image: 8-bit grey. For each tag its four corners in the order of KnownPattern::points_m, in
+  // OpenCV's pixels; empty: not found. A grid that differs from the pattern's name is not found.
   using Corners = std::vector<cv::Point2f>;
   [[nodiscard]] const std::vector<Corners>& find(const cv::Mat& image);
 
-  // One line, in what the grid of the images so far is another; empty: nothing to say.
+  // One line: how the grid in the images so far differs from the name; empty: not at all.
   [[nodiscard]] std::string doubt() const;
 
  private:
   struct Library;
 
-  // In the last image nothing was found: whatever comes may be printed in another way.
+  // For when the last image showed nothing: the next grid may be printed differently.
   void forget_layout();
   void search(const cv::Mat& image);
   // libapriltag's tags, those with the border that most of them have.
   [[nodiscard]] std::vector<NumberedTag> detected(const cv::Mat& image);
-  // The same once tags and squares no longer touch; takes four times as long.
+  // The same on an image in which tags and squares are separated; takes four times as long.
   [[nodiscard]] std::vector<NumberedTag> detected_apart(const cv::Mat& image);
   void follow(const cv::Mat& image);
   void grow(const cv::Mat& image);
-  // A corner that slid along its square to another one fits no neighbour: once more from where they expect it, else the tag goes.
+  // A corner that slid along its square to another corner fits no neighbour. Refines it again from
+  // its predicted place, else drops the tag.
   void repair(const cv::Mat& image);
-  // By its neighbours; robust: some of their corners may be wrong. Empty: there is none beside it.
+  // From the neighbours; robust: some of their corners may be wrong. Empty: it has no neighbour.
   [[nodiscard]] Corners predicted(int tag, bool robust) const;
-  // Refines the corners and says whether the tag is there.
+  // Refines the corners. False: the tag is not there.
   [[nodiscard]] bool confirm(const cv::Mat& image, int tag, Corners* corners);
   [[nodiscard]] double code_correlation(const cv::Mat& image, int tag,
                                         const Corners& corners) const;
-  // Beside which of the tag's corners squares are printed; what is not known yet, by what is seen there.
+  // Which of the tag's corners have squares printed beside them. What is not known yet, the image
+  // decides.
   [[nodiscard]] CornerSquares squares_of(int tag, const Corners& corners);
 
   KnownPattern pattern_;
   std::vector<cv::Point2f> points_;  // m
   std::unique_ptr<Library> library_;
   std::vector<TagFace> faces_;  // by tag
-  cv::Mat smooth_;              // the image, for corners
-  // Corners about which a square was seen less those without one: between tags, on the grid's rim.
+  cv::Mat smooth_;              // the smoothed image, for corners
+  // Corners seen with a square minus those without: between tags, and on the grid's rim.
   std::array<int, 2> square_votes_ = {};
   TagSpacing spacing_;
   NowAndThen now_and_then_;

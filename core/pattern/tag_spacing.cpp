@@ -12,14 +12,14 @@
 namespace alidade::internal {
 namespace {
 
-constexpr std::size_t kMostGaps = 2000;  // one more changes nothing
+constexpr std::size_t kMostGaps = 2000;  // more change nothing
 constexpr std::size_t kFewestGaps = 8;
 constexpr double kLeastGapError = 0.015;  // more than a lens bends over two tags
 constexpr double kLeastRoughError = 0.06;
 constexpr double kGapSigmas = 5;
 constexpr int kFewestSteps = 5;
-constexpr double kMostSteps = 0.8;  // that agree, of all
-constexpr double kAcross = 0.25;    // off the line that a tag's side continues, of the distance
+constexpr double kMostSteps = 0.8;  // share of all steps that must agree
+constexpr double kAcross = 0.25;    // of the distance; off the line of a tag's side
 
 double median_of(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -27,7 +27,7 @@ double median_of(std::vector<double> values) {
   return *middle;
 }
 
-// Of four places on a line at 0, 1, 1 + gap and 2 + gap.
+// The gap from four points on a line at 0, 1, 1 + gap and 2 + gap.
 std::optional<double> gap_of(const cv::Point2f& a, const cv::Point2f& b, const cv::Point2f& c,
                              const cv::Point2f& d) {
   const double ratio = cv::norm(c - a) * cv::norm(d - b) / (cv::norm(c - b) * cv::norm(d - a));
@@ -35,7 +35,7 @@ std::optional<double> gap_of(const cv::Point2f& a, const cv::Point2f& b, const c
   return std::sqrt(ratio / (ratio - 1)) - 1;
 }
 
-// The other tag's middle in this one's frame: from its middle, right and up, sides.
+// The other tag's middle in this tag's frame: from its middle, right and up, in sides.
 cv::Point2f place_of(const NumberedTag& other, const NumberedTag& tag) {
   const cv::Point2f middle =
       (other.corners[0] + other.corners[1] + other.corners[2] + other.corners[3]) / 4;

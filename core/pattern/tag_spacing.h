@@ -1,6 +1,7 @@
 #pragma once
-// What tags in images tell of the grid that they are printed in, whatever it is said to be: the gap between them, by the cross
-// ratio of the four corners on a line of edges, and how they are numbered. Times and lens do not matter.
+// TagSpacing: measures the grid in which tags are printed, whatever it is named: the gap between
+// tags, by the cross ratio of the four corners on a line of edges, and the order of their numbers.
+// Independent of times and lens.
 
 #include <map>
 #include <opencv2/core.hpp>
@@ -18,16 +19,16 @@ struct NumberedTag {
 
 class TagSpacing {
  public:
-  // pattern: what the grid is said to be.
+  // pattern: the grid as it was named.
   explicit TagSpacing(const KnownPattern& pattern) : pattern_(pattern), gap_(pattern.gap) {}
 
-  // Those of one image. rough: corners may be half a pixel off.
+  // Adds the tags of one image. rough: corners may be half a pixel off.
   void add(const std::vector<NumberedTag>& tags, bool rough);
 
-  // Between tags, a part of their side: as it is said to be, unless it is known to be another.
+  // Gap between tags, as a share of their side. As named, unless it was measured to be different.
   [[nodiscard]] double gap() const { return gap_; }
 
-  // One line, what is otherwise than it is said to be; empty: nothing is known to be.
+  // One line about what differs from the name; empty if nothing is known to differ.
   [[nodiscard]] std::string doubt() const;
 
  private:
@@ -36,7 +37,7 @@ class TagSpacing {
   KnownPattern pattern_;
   double gap_;
   std::vector<double> gaps_, rough_gaps_;  // parts of a tag's side
-  std::map<int, int> steps_upward_;  // how often a tag above another had a number larger by so many
+  std::map<int, int> steps_upward_;        // how often the tag above had a number larger by this
 };
 
 }  // namespace alidade::internal

@@ -117,7 +117,7 @@ void JointAssociation::fill_cluster(const double* missed, const GatedPair* pairs
   columns_ = 0;
   for (int row = 0; row < rows_; ++row) {
     const int t = members_[at(row)];
-    // A common factor of a target's possibilities changes nothing, and keeps the products in range.
+    // A common factor of a target's options changes nothing, and keeps the products in range.
     double scale = missed[t];
     for (int i = first_pair_[at(t)]; i < first_pair_[at(t) + 1]; ++i) {
       scale = std::max(scale, pairs[i].ratio);

@@ -12,28 +12,28 @@ namespace alidade {
 
 namespace {
 
-// Puts the chart's origin where the place's mean is, along the great circle.
+// Moves the chart's origin to the place's mean, along the great circle.
 void follow_place(TargetState* state) {
   const Vector3<double> turn(0, state->mean[1], state->mean[0]);
   const double angle = turn.norm();
   if (angle > 0) {
     state->R_base_from_chart =
         (state->R_base_from_chart * Eigen::AngleAxisd(angle, turn / angle)).eval();
-    // Products of rotations drift; one Newton step towards orthogonality keeps them.
+    // Products of rotations drift; one Newton step restores orthogonality.
     const Matrix3<double> R = state->R_base_from_chart;
     state->R_base_from_chart = 1.5 * R - 0.5 * R * (R.transpose() * R);
   }
   state->mean.head<2>().setZero();
 }
 
-// Columns: how the direction moves with azimuth and elevation of the chart.
+// Columns: derivative of the direction by azimuth and elevation of the chart.
 Matrix<double, 3, 2> chart_tangents(const Matrix3<double>& R_base_from_chart) {
   Matrix<double, 3, 2> tangents;
   tangents << R_base_from_chart.col(1), -R_base_from_chart.col(2);
   return tangents;
 }
 
-// Forward, right and down of base turned so that x is the direction.
+// Base axes (forward, right, down) turned so that x is the direction.
 Matrix3<double> chart_at(const Vector3<double>& d) {
   const Vector3<double> right(-d.y(), d.x(), 0);
   Matrix3<double> R;
@@ -164,7 +164,8 @@ std::optional<AzimuthElevation> azimuth_elevation(const TargetState& state) {
   AzimuthElevation result;
   result.value << wrap_angle(std::atan2(d.y(), d.x())), std::atan2(sin_el, cos_el), v[0] / cos_el,
       v[1];
-  // A velocity that goes along with the place turns against the circles of elevation by sin(el) d azimuth.
+  // A velocity that moves with the place turns against the circles of elevation by sin(el) d
+  // azimuth.
   Matrix4<double> J = Matrix4<double>::Zero();
   J(0, 0) = 1 / cos_el;
   J(1, 1) = 1;

@@ -1,8 +1,10 @@
 #pragma once
-// What a target tracker is told of one frame: when, how measured coordinates depend on the place in the world, how much of it is in view,
-// and the detections. The camera is the caller's: the tracker sees a homography (target_filter.h) and numbers.
-// In view is what lies inside all edges of a region of measured coordinates: edge . (x, y, 1) > 0. For detections in pixels that is the
-// picture, for detections on the plane what the picture shows of it; what hides targets is cut off likewise.
+// A tracker's input for one frame: time, the map from the world to measured coordinates, the region
+// in view, detections. The caller knows the camera; the tracker only gets a homography
+// (target_filter.h).
+// The view is inside all edges of a region of measured coordinates: edge . (x, y, 1) > 0. For
+// detections in pixels that is the picture, for those on the plane what the picture shows of it.
+// Parts that are hidden are cut off likewise.
 
 #include <array>
 #include <cmath>
@@ -15,7 +17,7 @@ namespace alidade {
 struct ViewRegion {
   static constexpr int kMostEdges = 6;
   std::array<Vector3<double>, kMostEdges> edges{};
-  int count = 0;  // 0: everything is in view
+  int count = 0;  // 0: no limit
 };
 
 [[nodiscard]] inline ViewRegion picture_region(double width_px, double height_px) {
@@ -28,7 +30,7 @@ struct ViewRegion {
   return region;
 }
 
-// How likely a place with this covariance is in the region, were the distances to its edges independent.
+// Probability that a place is in the region, as if the distances to its edges were independent.
 [[nodiscard]] inline double probability_in_view(const ViewRegion& region,
                                                 const Vector2<double>& place,
                                                 const Matrix2<double>& cov) {

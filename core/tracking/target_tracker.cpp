@@ -12,7 +12,7 @@ namespace alidade {
 
 namespace {
 
-// Identities given while frames are done again, until it is known who was who.
+// Identities given while frames are repeated, until they are matched with the earlier ones.
 constexpr std::uint64_t kProvisional = std::uint64_t{1} << 63;
 constexpr double kLeastWeightOfSeen = 0.3;
 constexpr double kClaimed = 0.5;
@@ -22,7 +22,7 @@ std::size_t index(int i) { return static_cast<std::size_t>(i); }
 
 bool positive(double v) { return std::isfinite(v) && v > 0; }
 
-// The greater standard deviation of the place.
+// The larger standard deviation of the place.
 double worst_sigma(const TargetState& state) {
   const double mean = 0.5 * (state.cov(0, 0) + state.cov(1, 1));
   const double half = 0.5 * (state.cov(0, 0) - state.cov(1, 1));
@@ -135,7 +135,8 @@ FrameAnswer TargetTracker::check(const TargetFrame& frame, double now_s) const {
   answer.status = FrameStatus::kTooLate;
   if (!order_.empty() && frame.time_s < time_s_) {
     if (time_s_ - frame.time_s > options_.history_s) return answer;
-    // A full history loses its oldest frame to this one; what was before the oldest that stays is known only where nothing was lost.
+    // A full history loses its oldest frame to this one. The targets before its new oldest frame
+    // are known only if no frame was lost.
     const bool full = order_.size() == history_.size();
     const std::size_t oldest = full ? 1 : 0;
     if (oldest == order_.size()) return answer;
@@ -287,7 +288,8 @@ void TargetTracker::associate() {
     claimed_[index(pairs_[index(i)].detection)] += pairs_[index(i)].weight;
   }
 
-  // The elder first: of two on one target, which weigh its detection alike, the younger goes unseen.
+  // Elder targets first: of two on one target, which share its detection's weight, the younger goes
+  // unseen.
   for (std::size_t t = 0; t < targets_.size(); ++t) {
     targets_[t].detection = -1;
     double best = kLeastWeightOfSeen;
@@ -299,7 +301,7 @@ void TargetTracker::associate() {
     }
     if (targets_[t].detection >= 0) taken_[index(targets_[t].detection)] = 1;
   }
-  // What a target that is not seen may just reach is rather that target, turning, than a new one.
+  // A detection in the gate of an unseen target is rather that target, turning, than a new one.
   for (std::size_t t = 0; t < targets_.size(); ++t) {
     if (targets_[t].identity == 0 || targets_[t].detection >= 0) continue;
     for (int i = 0; i < seen_[t].pairs; ++i) {
@@ -327,7 +329,8 @@ void TargetTracker::count_looks(const TargetFrame& frame, double dt_s) {
       target.unseen_s = 0;
       target.seen_s = frame.time_s;
     } else {
-      // A place that may as well be out of view is no evidence: not being seen then says that it is out of view.
+      // A place that is as likely out of view gives no evidence: that the target is unseen then
+      // says that it is out of view.
       target.unseen_s += dt_s * std::max(2 * target.in_view - 1, 0.0);
     }
     if (target.identity != 0) continue;
@@ -379,7 +382,8 @@ void TargetTracker::bear(const Kept& kept) {
   }
 }
 
-// A target that was born anew while frames were done again is the one that was at its place before, or a new one.
+// A target born again while frames were repeated gets the identity of the one at its place before,
+// or a new one.
 void TargetTracker::name_replayed(std::size_t position) {
   for (Target& target : targets_) {
     if (target.identity < kProvisional) continue;

@@ -1,16 +1,11 @@
 #pragma once
-// Targets from detections, frame after frame: predicted, associated, updated (target_filter.h, joint_association.h), born and given up.
-//   born     from a detection that no target claims, nor a target could that is not seen; confirmed, with an identity, when seen in
-//            birth_hits of its first birth_looks looks
-//   given up when it was in view and not seen for lose_after_s: each frame counts with how much likelier the place was in view than not.
-//            Out of view it waits while its covariance grows, for forget_after_s or until it could be anywhere (most_sigma), and is taken
-//            up where it comes back
-//   late     a frame is put in its place and those after it are done again, up to history_s and history_frames back: that costs one step
-//            for each. What comes out is what the right order had given; targets keep their identities
-//   refused  a frame with anything wrong in it, as a whole and with the reason; nothing changes
-// A detection counts as seen for one target only, so that of two on the same target the younger dies. Identities count from 1 and never come again.
-// Equal calls give equal results. Memory is taken in the constructor: about max_targets * (300 + 100 max_detections) +
-// history_frames * (320 max_targets + 50 max_detections) bytes. No allocation after it. For one thread.
+// TargetTracker: targets from detections, frame by frame: predicted, associated, updated
+// (target_filter.h, joint_association.h), born and given up. Rules: docs/derivations.md. A late
+// frame is put in its place and those after it are repeated: the result is that of the right order,
+// and identities stay. A frame with any fault is refused as a whole, with its reason.
+// Identities count from 1 and are never reused. Equal calls give equal results. For one thread. The
+// constructor takes all memory, no call allocates: about max_targets * (300 + 100
+// max_detections) + history_frames * (320 max_targets + 50 max_detections) bytes.
 
 #include <cstdint>
 #include <vector>
@@ -24,74 +19,75 @@ namespace alidade {
 struct TargetTrackerOptions {
   TargetSpace space = TargetSpace::kPlane;
   AssociationMethod association = AssociationMethod::kExact;
-  double acceleration_density = 0.5;   // m^2/s^3 or rad^2/s^3; 0.5: people who walk
+  double acceleration_density = 0.5;   // m^2/s^3 or rad^2/s^3; 0.5: walkers
   double sigma_first_velocity = 2;     // m/s or rad/s
   double detection_probability = 0.9;  // of a target in view, in (0, 1)
-  // That a target's detection is in its gate, in (0, 1). Wide: who turns sharply is still in it, and the weights know how unlikely that is.
+  // Of a target's detection to be in its gate, in (0, 1). Wide, so that a target that turns sharply
+  // stays inside; the weights account for how unlikely that is.
   double gate_probability = 0.99999;
-  int birth_hits = 3;
-  int birth_looks = 5;         // at most 32
-  double lose_after_s = 1;     // in view, unseen
+  int birth_hits = 3;          // sightings that confirm a target
+  int birth_looks = 5;         // the first looks, among which they must be
+  double lose_after_s = 1;     // time in view without being seen
   double forget_after_s = 60;  // since last seen
   double most_sigma = 30;      // m or rad, of the place along its worst direction
-  double most_ahead_s = 0.5;   // a frame later than now by more is refused
-  double history_s = 2;        // how late a frame may come
-  int history_frames = 64;     // at most that many are kept for it
-  int max_targets = 256;       // with those that are not confirmed
-  int max_detections = 256;    // a frame
+  double most_ahead_s = 0.5;   // limit of a frame's time after now
+  double history_s = 2;        // limit of a late frame's delay
+  int history_frames = 64;     // kept for late frames
+  int max_targets = 256;       // including unconfirmed ones
+  int max_detections = 256;    // of a frame
 
   [[nodiscard]] bool validate(const char** error = nullptr) const;
 };
 
 enum class FrameStatus {
   kTaken,
-  kTakenLate,            // put in its place, later frames done again
-  kTooLate,              // more than the history reaches back
-  kInTheFuture,          // later than now
-  kBadFrame,             // a number is not finite, H singular, the density not positive
+  kTakenLate,            // put in its place, later frames repeated
+  kTooLate,              // beyond the history
+  kInTheFuture,          // more than most_ahead_s after now
+  kBadFrame,             // not finite, H singular, or density not positive
   kTooManyDetections,    // more than max_detections
   kDetectionNotFinite,   // place or covariance
   kDetectionCovariance,  // not symmetric and positive definite
-  kDetectionOutside,     // of the view, by more than five of its sigmas
+  kDetectionOutside,     // of the view by more than five sigmas
 };
 
 [[nodiscard]] const char* to_string(FrameStatus status);
 
 struct FrameAnswer {
   FrameStatus status = FrameStatus::kTaken;
-  int detection = -1;  // the one at fault
-  int steps = 0;       // frames done: 1, more for a late one
+  int detection = -1;  // the detection at fault
+  int steps = 0;       // frames processed: 1, more for a late one
 };
 
 struct Target {
   std::uint64_t identity = 0;  // 0: not confirmed
   TargetState state;           // at the newest frame's time
   double born_s = 0;
-  double seen_s = 0;    // time of the last frame it was seen in
-  double unseen_s = 0;  // how long it has been in view without being seen
-  double in_view = 1;   // how likely it was in view of the last frame
-  int detection = -1;   // of the last frame, the one that counts as seen
-  int looks = 0;        // until it was confirmed
+  double seen_s = 0;    // of the last frame that saw it
+  double unseen_s = 0;  // time in view without being seen
+  double in_view = 1;   // probability of being in view of the last frame
+  int detection = -1;   // of the last frame; the one that counts as seen; -1: none
+  int looks = 0;        // until confirmed
   int hits = 0;
 };
 
 class TargetTracker {
  public:
-  // options are valid.
+  // options must be valid.
   explicit TargetTracker(const TargetTrackerOptions& options);
 
-  // now_s: the caller's clock, which frames' times are of.
+  // now_s: the clock of the frames' times.
   [[nodiscard]] FrameAnswer add(const TargetFrame& frame, double now_s);
 
-  // In the order of their birth; those without identity may be false alarms.
+  // In order of birth. Those without identity may be false alarms.
   [[nodiscard]] const std::vector<Target>& targets() const { return targets_; }
   // Of the newest frame.
   [[nodiscard]] double time_s() const { return time_s_; }
-  // Births refused because max_targets are there.
+  // Births refused because there were max_targets.
   [[nodiscard]] std::int64_t births_refused() const { return births_refused_; }
 
  private:
-  // A frame as it came, and the targets as they were after it.
+  // A frame as it came, and the targets after it.
   struct Kept {
     TargetFrame frame;
     std::vector<TargetMeasurement> detections;
@@ -131,13 +127,13 @@ class TargetTracker {
   std::vector<std::size_t> order_;  // of history_, by time
   std::vector<std::size_t> free_;
   std::vector<Target> before_replay_;
-  // Of the frame at hand.
+  // Scratch of the current frame.
   std::vector<Seen> seen_;
   std::vector<GatedPair> pairs_;
   std::vector<Innovation> innovations_;
   std::vector<double> weights_, missed_, claimed_;
-  std::vector<char>
-      taken_;  // of each detection: no other target is seen in it, none is born from it
+  // By detection: no other target may be seen in it and none born from it.
+  std::vector<char> taken_;
   std::vector<int> by_x_;
 };
 
