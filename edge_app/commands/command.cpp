@@ -174,36 +174,7 @@ std::int64_t most_pixels(const VideoConfig& config) {
   return config.width > 0 ? std::int64_t{config.width} * config.height : kMostLivePixels;
 }
 
-}  // namespace
-
-std::unique_ptr<FrameSource> make_frame_source(const VideoConfig& config, bool decode,
-                                               const std::string& copy_to) {
-  if (config.type == VideoConfig::Type::kRecording) {
-    return open_recorded_frames(RecordingFrameSourceOptions{config.directory, decode, true});
-  }
-  if (config.type == VideoConfig::Type::kMjpeg) {
-    MjpegSourceOptions options;
-    options.url = config.url;
-    options.user = config.user;
-    options.password = config.password;
-    options.rules = config.rules;
-    options.decode = decode;
-    options.timeout_s = config.timeout_s;
-    options.max_backoff_s = config.max_backoff_s;
-    options.max_pixels = most_pixels(config);
-    options.copy_to = copy_to;
-    return open_mjpeg(options);
-  }
-  if (config.type == VideoConfig::Type::kV4l2) {
-    V4l2SourceOptions options;
-    options.device = config.device;
-    options.wish = {config.pixel_format, config.width, config.height, config.rate_hz};
-    options.decode = decode;
-    options.timeout_s = config.timeout_s;
-    options.max_backoff_s = config.max_backoff_s;
-    options.copy_to = copy_to;
-    return open_v4l2(options);
-  }
+RtpSourceOptions rtp_options(const VideoConfig& config, bool decode, const std::string& copy_to) {
   RtpSourceOptions options;
   options.url = config.url;
   options.user = config.user;
@@ -219,7 +190,53 @@ std::unique_ptr<FrameSource> make_frame_source(const VideoConfig& config, bool d
   options.max_backoff_s = config.max_backoff_s;
   options.max_pixels = most_pixels(config);
   options.copy_to = copy_to;
-  return open_rtp(options);
+  return options;
+}
+
+MjpegSourceOptions mjpeg_options(const VideoConfig& config, bool decode,
+                                 const std::string& copy_to) {
+  MjpegSourceOptions options;
+  options.url = config.url;
+  options.user = config.user;
+  options.password = config.password;
+  options.rules = config.rules;
+  options.decode = decode;
+  options.timeout_s = config.timeout_s;
+  options.max_backoff_s = config.max_backoff_s;
+  options.max_pixels = most_pixels(config);
+  options.copy_to = copy_to;
+  return options;
+}
+
+V4l2SourceOptions v4l2_options(const VideoConfig& config, bool decode, const std::string& copy_to) {
+  V4l2SourceOptions options;
+  options.device = config.device;
+  options.wish = {config.pixel_format, config.width, config.height, config.rate_hz};
+  options.decode = decode;
+  options.timeout_s = config.timeout_s;
+  options.max_backoff_s = config.max_backoff_s;
+  options.copy_to = copy_to;
+  return options;
+}
+
+}  // namespace
+
+std::unique_ptr<FrameSource> make_frame_source(const VideoConfig& config, bool decode,
+                                               const std::string& copy_to) {
+  switch (config.type) {
+    case VideoConfig::Type::kRtsp:
+    case VideoConfig::Type::kRtp:
+      return open_rtp(rtp_options(config, decode, copy_to));
+    case VideoConfig::Type::kMjpeg:
+      return open_mjpeg(mjpeg_options(config, decode, copy_to));
+    case VideoConfig::Type::kV4l2:
+      return open_v4l2(v4l2_options(config, decode, copy_to));
+    case VideoConfig::Type::kRecording:
+      return open_recorded_frames(RecordingFrameSourceOptions{config.directory, decode, true});
+    case VideoConfig::Type::kCount:
+      break;
+  }
+  throw std::logic_error("a type of video source that does not exist");
 }
 
 namespace {

@@ -103,8 +103,11 @@ LiveTargets::LiveTargets(const Config& config, std::shared_ptr<const PlaneEstima
   if (!config.detectors.any()) return;
   tap_.emplace(detectors_.emplace(config.detectors, std::move(plane),
                                   load_network(config.detectors.onnx), feed_));
-  spdlog::info("detectors:{}{}{}", config.detectors.onnx ? " onnx" : "",
-               config.detectors.people ? " people" : "", config.detectors.motion ? " motion" : "");
+  std::string names;
+  for (const DetectorKindRow& row : kDetectorKinds) {
+    if (config.detectors.has(row.kind)) names += std::string(" ") + row.name;
+  }
+  spdlog::info("detectors:{}", names);
 }
 
 DetectorsReport LiveTargets::detectors() const {

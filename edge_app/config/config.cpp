@@ -16,67 +16,6 @@
 namespace alidade {
 namespace {
 
-constexpr NumberRange kPixels{1, kMostPictureSide, "px"};
-
-VideoConfig read_video(YamlSection section, const std::string& path) {
-  VideoConfig video;
-  const auto type = section.choice("type", {"rtsp", "rtp", "mjpeg", "v4l2", "recording"});
-  if (!type) section.fail_missing("type", "expected one of rtsp, rtp, mjpeg, v4l2, recording");
-  if (*type == "recording") {
-    video.type = VideoConfig::Type::kRecording;
-    video.directory = path_relative_to(path, required_text(section, "directory", "my-recording"));
-  } else if (*type == "rtsp") {
-    video.type = VideoConfig::Type::kRtsp;
-    video.url = required_url(section, "rtsp://camera/stream", {"rtsp://", "rtsps://"});
-    read_login(section, &video.user, &video.password);
-    video.rules = read_link_rules(section);
-    const bool by_tls = video.url.rfind("rtsps://", 0) == 0;
-    if (section.choice("transport", {"tcp", "udp"}).value_or("tcp") == "udp") {
-      if (by_tls) {
-        section.fail("transport", "udp does not go with rtsps://; leave it out, or set tcp");
-      }
-      video.transport = VideoConfig::Transport::kUdp;
-    }
-    if (const auto file = section.text("certificate_file")) {
-      if (!by_tls) section.fail("certificate_file", "is for rtsps:// only");
-      video.certificate_file = path_relative_to(path, *file);
-      refuse_other_than_file(section, "certificate_file", video.certificate_file);
-    }
-  } else if (*type == "mjpeg") {
-    video.type = VideoConfig::Type::kMjpeg;
-    video.url = required_url(section, "http://camera/mjpg/video.mjpg", {"http://", "https://"});
-    read_login(section, &video.user, &video.password);
-    video.rules = read_link_rules(section);
-  } else if (*type == "v4l2") {
-    video.type = VideoConfig::Type::kV4l2;
-    video.device = path_relative_to(path, required_text(section, "device", "/dev/video0"));
-    if (const auto format = section.choice("format", {"GREY", "NV12", "YUYV", "UYVY", "MJPG"})) {
-      video.pixel_format = v4l2_format_of_name(*format);
-    }
-    video.rate_hz = section.number("rate_hz", {0.1, 1000, "Hz"}).value_or(video.rate_hz);
-  } else {
-    video.type = VideoConfig::Type::kRtp;
-    video.url = required_text(section, "url", "camera.sdp");
-    if (video.url.rfind("rtp://", 0) == 0) {
-      video.format = section.choice("format", {"MJPG", "H264", "H265"}).value_or(video.format);
-    } else {
-      video.url = path_relative_to(path, video.url);
-      refuse_other_than_file(section, "url", video.url);
-    }
-  }
-  if (video.type != VideoConfig::Type::kRecording) {
-    video.width = section.integer("width", kPixels).value_or(0);
-    video.height = section.integer("height", kPixels).value_or(0);
-    if ((video.width == 0) != (video.height == 0)) {
-      section.fail(video.width == 0 ? "height" : "width", "stands alone; give width and height");
-    }
-    video.timeout_s = section.number("timeout_s", kSeconds).value_or(video.timeout_s);
-    video.max_backoff_s = section.number("max_backoff_s", kSeconds).value_or(video.max_backoff_s);
-  }
-  section.finish();
-  return video;
-}
-
 constexpr NumberRange kFocalLengths{1, 1e8, "px"};
 
 FocalLengthRange read_focal_lengths(YamlSection section) {
@@ -339,18 +278,19 @@ void check_together(const Config& config, const YamlSection& calibration,
 
 // Detectors need `tracking`, as their boxes become targets. They look only at frames in OE mode.
 void check_detectors(const Config& config, const YamlSection& detectors) {
-  if (!config.detectors.any()) return;
-  const char* first = config.detectors.motion   ? "motion"
-                      : config.detectors.people ? "people"
-                                                : "onnx";
-  if (!config.tracking.targets)
-    detectors.fail(first, "stands without section tracking; add tracking");
-  if (!config.realtime.landmarks)
-    detectors.fail(first, "looks at frames in OE mode only, and realtime.mode is PT; set it to OE");
-  if (config.detectors.people && config.tracking.plane.empty()) {
-    detectors.fail("people",
-                   "takes the ground, which tells how tall people are in the picture; add "
-                   "tracking.plane, a plane.yaml of alidade plane fit");
+  for (const DetectorKindRow& row : kDetectorKinds) {
+    if (!config.detectors.has(row.kind)) continue;
+    if (!config.tracking.targets)
+      detectors.fail(row.name, "stands without section tracking; add tracking");
+    if (!config.realtime.landmarks) {
+      detectors.fail(row.name,
+                     "looks at frames in OE mode only, and realtime.mode is PT; set it to OE");
+    }
+    if (row.needs_ground && config.tracking.plane.empty()) {
+      detectors.fail(row.name,
+                     "takes the ground, which tells how large targets are in the picture; add "
+                     "tracking.plane, a plane.yaml of alidade plane fit");
+    }
   }
 }
 

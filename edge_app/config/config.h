@@ -15,34 +15,11 @@
 #include "edge_app/config/mqtt_config.h"
 #include "edge_app/config/pan_tilt_config.h"
 #include "edge_app/config/tracking_config.h"
+#include "edge_app/config/video_config.h"
 #include "edge_app/output/http/http_options.h"
 #include "edge_app/record/record_format.h"  // OutputFormat
-#include "platform/system/link_rules.h"
-#include "platform/video/v4l2_mode.h"  // V4l2Format
 
 namespace alidade {
-
-struct VideoConfig {
-  enum class Type { kRtsp, kRtp, kMjpeg, kV4l2, kRecording };
-  enum class Transport { kTcp, kUdp };
-  Type type = Type::kRtsp;
-  // rtsp: rtsp://... or rtsps://...; mjpeg: http(s)://...; rtp: an .sdp file or rtp://address:port.
-  std::string url;
-  std::string format = "MJPG";             // of rtp://address:port: MJPG, H264 or H265
-  std::string directory;                   // recording
-  std::string device;                      // v4l2: /dev/video0
-  std::optional<V4l2Format> pixel_format;  // v4l2; empty: the first that fits
-  double rate_hz = 0;                      // v4l2; 0: the device's own
-  int width = 0;                           // px, required of live video; 0: any
-  int height = 0;                          // px, likewise
-  std::string user;                        // rtsp, mjpeg
-  std::string password;
-  LinkRules rules;                        // rtsp, mjpeg
-  Transport transport = Transport::kTcp;  // rtsp
-  std::string certificate_file;           // rtsps://; empty: the system's
-  double timeout_s = 3;                   // s without a picture; then the camera counts as lost
-  double max_backoff_s = 5;               // s, longest pause between two attempts to connect
-};
 
 // The focal lengths of a zoom lens at both ends of its range.
 struct FocalLengthRange {

@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <utility>
+#include <vector>
+
 #include "edge_app/config/link_keys.h"
 
 namespace alidade {
@@ -57,16 +60,28 @@ NetworkFiles read_onnx(YamlSection section, const std::string& config_path) {
 
 BuiltInDetectorOptions read_detectors(YamlSection section, const std::string& config_path) {
   BuiltInDetectorOptions detectors;
-  const bool has_motion = section.has("motion");
-  const bool has_people = section.has("people");
-  const bool has_onnx = section.has("onnx");
-  const YamlSection motion = section.section("motion");
-  const YamlSection people = section.section("people");
-  const YamlSection onnx = section.section("onnx");
+  std::vector<std::pair<DetectorKind, YamlSection>> given;
+  for (const DetectorKindRow& row : kDetectorKinds) {
+    const bool is_given = section.has(row.name);
+    YamlSection of_kind = section.section(row.name);
+    if (is_given) given.emplace_back(row.kind, std::move(of_kind));
+  }
   section.finish();
-  if (has_motion) detectors.motion = read_motion(motion);
-  if (has_people) detectors.people = read_people(people);
-  if (has_onnx) detectors.onnx = read_onnx(onnx, config_path);
+  for (auto& [kind, of_kind] : given) {
+    switch (kind) {
+      case DetectorKind::kOnnx:
+        detectors.onnx = read_onnx(of_kind, config_path);
+        break;
+      case DetectorKind::kPeople:
+        detectors.people = read_people(of_kind);
+        break;
+      case DetectorKind::kMotion:
+        detectors.motion = read_motion(of_kind);
+        break;
+      case DetectorKind::kCount:
+        break;
+    }
+  }
   return detectors;
 }
 

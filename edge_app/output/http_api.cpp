@@ -298,16 +298,17 @@ Json link_json(const LinkHealth& link) {
 }
 
 Json detectors_json(const DetectorsReport& report) {
-  const auto one = [](const std::optional<DetectorCounters>& counters) -> Json {
-    if (!counters) return nullptr;
-    return {{"pictures", counters->pictures},
-            {"unjudged", counters->unjudged},
-            {"boxes", counters->boxes}};
-  };
-  return {{"replaced", report.replaced},
-          {"motion", one(report.motion)},
-          {"people", one(report.people)},
-          {"onnx", one(report.onnx)}};
+  Json out{{"replaced", report.replaced}};
+  for (const DetectorKindRow& row : kDetectorKinds) {
+    const std::optional<DetectorCounters>& counters = report.counters[row.kind];
+    out[row.name] = nullptr;
+    if (counters) {
+      out[row.name] = {{"pictures", counters->pictures},
+                       {"unjudged", counters->unjudged},
+                       {"boxes", counters->boxes}};
+    }
+  }
+  return out;
 }
 
 ServerResponse status(const HttpApiSources& sources, const HttpServer& server) {

@@ -202,22 +202,22 @@ void add_target_metrics(const TargetFeed& feed, MetricsText* out) {
 }
 
 void add_detector_metrics(const DetectorsReport& report, MetricsText* out) {
-  const std::array<std::pair<const char*, const std::optional<DetectorCounters>*>, 3> all = {
-      {{"motion", &report.motion}, {"people", &report.people}, {"onnx", &report.onnx}}};
   out->counter("alidade_detector_pictures_replaced_total",
                "Pictures that no detector looked at, as a newer one came");
   out->add(report.replaced);
   out->counter("alidade_detector_pictures_total",
                "Pictures that a detector looked at, by whether it could judge them");
-  for (const auto& [name, counters] : all) {
-    if (!*counters) continue;
-    out->add((*counters)->pictures - (*counters)->unjudged,
-             {{"detector", name}, {"result", "judged"}});
-    out->add((*counters)->unjudged, {{"detector", name}, {"result", "unjudged"}});
+  for (const DetectorKindRow& row : kDetectorKinds) {
+    const std::optional<DetectorCounters>& counters = report.counters[row.kind];
+    if (!counters) continue;
+    out->add(counters->pictures - counters->unjudged,
+             {{"detector", row.name}, {"result", "judged"}});
+    out->add(counters->unjudged, {{"detector", row.name}, {"result", "unjudged"}});
   }
   out->counter("alidade_detector_boxes_total", "Boxes that a detector found");
-  for (const auto& [name, counters] : all) {
-    if (*counters) out->add((*counters)->boxes, {{"detector", name}});
+  for (const DetectorKindRow& row : kDetectorKinds) {
+    if (const auto& counters = report.counters[row.kind])
+      out->add(counters->boxes, {{"detector", row.name}});
   }
 }
 

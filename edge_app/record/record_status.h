@@ -49,31 +49,19 @@ enum class RecordStatus : std::uint8_t {
   kZoomMoves,  // mode PT: the lens moves, or has just left the zoom curve; no map to follow it with
   // Mode PT: the zoom curve does not know the focal length well enough here for landmarks to be
   // looked for (zoom_lookup.h).
-  kFocalLengthUnsure
+  kFocalLengthUnsure,
+  kCount
 };
 
-inline constexpr std::array<RecordStatus, 20> kRecordStatuses = {
-    RecordStatus::kOk,
-    RecordStatus::kClockWarmingUp,
-    RecordStatus::kTimeUnknown,
-    RecordStatus::kVideoLost,
-    RecordStatus::kTelemetryLost,
-    RecordStatus::kTelemetryMissing,
-    RecordStatus::kTelemetryTooOld,
-    RecordStatus::kTelemetryGap,
-    RecordStatus::kFrameBeforeTelemetry,
-    RecordStatus::kTooFewLandmarks,
-    RecordStatus::kContradiction,
-    RecordStatus::kBadImage,
-    RecordStatus::kImageTooLate,
-    RecordStatus::kImageRepeated,
-    RecordStatus::kOtherZoom,
-    RecordStatus::kNotFinite,
-    RecordStatus::kNotLocalized,
-    RecordStatus::kNotCalibrated,
-    RecordStatus::kZoomMoves,
-    RecordStatus::kFocalLengthUnsure};
-static_assert(static_cast<std::size_t>(kRecordStatuses.back()) + 1 == kRecordStatuses.size());
+inline constexpr auto kRecordStatusCount = static_cast<std::size_t>(RecordStatus::kCount);
+
+constexpr std::array<RecordStatus, kRecordStatusCount> all_record_statuses() {
+  std::array<RecordStatus, kRecordStatusCount> all{};
+  for (std::size_t i = 0; i < all.size(); ++i) all[i] = static_cast<RecordStatus>(i);
+  return all;
+}
+inline constexpr std::array<RecordStatus, kRecordStatusCount> kRecordStatuses =
+    all_record_statuses();
 
 // For a frame whose telemetry was queried. is_lost: there is no connection to the pan/tilt source.
 // clock_locked: the frame's time is known as well as it will be.
@@ -136,6 +124,8 @@ constexpr const char* to_string(RecordStatus status) {
       return "zoom moves";
     case RecordStatus::kFocalLengthUnsure:
       return "focal length uncertain";
+    case RecordStatus::kCount:
+      break;
   }
   return "unknown status";
 }

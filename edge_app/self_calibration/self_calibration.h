@@ -172,7 +172,10 @@ class SelfCalibration {
   bool doubtful_ = false;
   std::vector<double> rejected_;  // zooms whose stored calibrations were withdrawn
   bool delay_wanders_ = false;
-  DisagreementJudge old_telemetry_{{2, 0.5, 5}};
+  // Half of the frames of 2 s, as docs/records.md says of `needs`.
+  static constexpr DisagreementOptions kOldTelemetry = {/*span_s=*/2, /*share=*/0.5,
+                                                        /*least_frames=*/5};
+  DisagreementJudge old_telemetry_{kOldTelemetry};
   bool telemetry_is_old_ = false;
   ContradictionJudge contradiction_;
   DisagreementJudge disagreement_;

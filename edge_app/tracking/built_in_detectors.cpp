@@ -20,14 +20,33 @@ bool complete_orientation(const OrientationRecord& record, FrameOrientation* out
 
 }  // namespace
 
+bool BuiltInDetectorOptions::has(DetectorKind kind) const {
+  switch (kind) {
+    case DetectorKind::kOnnx:
+      return onnx.has_value();
+    case DetectorKind::kPeople:
+      return people.has_value();
+    case DetectorKind::kMotion:
+      return motion.has_value();
+    case DetectorKind::kCount:
+      break;
+  }
+  return false;
+}
+
+bool BuiltInDetectorOptions::any() const {
+  return std::any_of(kDetectorKinds.begin(), kDetectorKinds.end(),
+                     [this](const DetectorKindRow& row) { return has(row.kind); });
+}
+
 BuiltInDetectors::BuiltInDetectors(const BuiltInDetectorOptions& options,
                                    std::shared_ptr<const PlaneEstimate> plane,
                                    std::unique_ptr<NetworkDetector> network, TargetFeed& feed)
     : options_(options), plane_(std::move(plane)), feed_(feed), network_(std::move(network)) {
   if (options_.people) people_ = std::make_unique<PersonDetector>(*options_.people);
-  if (options_.motion) report_.motion.emplace();
-  if (options_.people) report_.people.emplace();
-  if (options_.onnx) report_.onnx.emplace();
+  for (const DetectorKindRow& row : kDetectorKinds) {
+    if (options_.has(row.kind)) report_.counters[row.kind].emplace();
+  }
 }
 
 template <typename Finish>
@@ -46,18 +65,33 @@ void BuiltInDetectors::take(const std::vector<DetectionBox>& found, Finish&& fin
   }
 }
 
-void BuiltInDetectors::count(std::optional<DetectorCounters>* counters, bool judged,
-                             std::size_t boxes) {
+void BuiltInDetectors::count(DetectorKind kind, bool judged, std::size_t boxes) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  ++(*counters)->pictures;
-  if (!judged) ++(*counters)->unjudged;
-  (*counters)->boxes += static_cast<std::int64_t>(boxes);
+  std::optional<DetectorCounters>& counters = report_.counters[kind];
+  ++counters->pictures;
+  if (!judged) ++counters->unjudged;
+  counters->boxes += static_cast<std::int64_t>(boxes);
+}
+
+bool BuiltInDetectors::find(DetectorKind kind, const ImageView& image,
+                            const FrameOrientation& orientation) {
+  switch (kind) {
+    case DetectorKind::kOnnx:
+      return find_by_network(image);
+    case DetectorKind::kPeople:
+      return find_people(image, orientation);
+    case DetectorKind::kMotion:
+      return find_motion(image, orientation);
+    case DetectorKind::kCount:
+      break;
+  }
+  return false;
 }
 
 bool BuiltInDetectors::find_by_network(const ImageView& image) {
   const bool judged = network_->find(image) == NetworkStatus::kOk;
   take(network_->boxes(), [](DetectionBox*) {});
-  count(&report_.onnx, judged, network_->boxes().size());
+  count(DetectorKind::kOnnx, judged, network_->boxes().size());
   return judged;
 }
 
@@ -67,7 +101,7 @@ bool BuiltInDetectors::find_people(const ImageView& image, const FrameOrientatio
     box->score = 1 / (1 + std::exp(-box->score));
     box->name = "person";
   });
-  count(&report_.people, judged, people_->boxes().size());
+  count(DetectorKind::kPeople, judged, people_->boxes().size());
   return judged;
 }
 
@@ -78,7 +112,7 @@ bool BuiltInDetectors::find_motion(const ImageView& image, const FrameOrientatio
     options.height = image.height;
     // The picture is too small or too large for this detector.
     if (!options.validate()) {
-      count(&report_.motion, false, 0);
+      count(DetectorKind::kMotion, false, 0);
       return false;
     }
     motion_ = std::make_unique<MotionDetector>(options);
@@ -86,7 +120,7 @@ bool BuiltInDetectors::find_motion(const ImageView& image, const FrameOrientatio
   const bool judged = motion_->find(image, orientation).status == MotionStatus::kOk;
   take(motion_->boxes(),
        [](DetectionBox* box) { box->score = std::min(1.0, box->score / kMostChangeScore); });
-  count(&report_.motion, judged, motion_->boxes().size());
+  count(DetectorKind::kMotion, judged, motion_->boxes().size());
   return judged;
 }
 
@@ -95,9 +129,9 @@ void BuiltInDetectors::look(const DetectableFrame& frame) {
   if (!complete_orientation(frame.record, &orientation)) return;
   boxes_.clear();
   bool judged = false;
-  if (network_) judged = find_by_network(frame.image);
-  if (people_) judged = find_people(frame.image, orientation) || judged;
-  if (options_.motion) judged = find_motion(frame.image, orientation) || judged;
+  for (const DetectorKindRow& row : kDetectorKinds) {
+    if (options_.has(row.kind)) judged = find(row.kind, frame.image, orientation) || judged;
+  }
   if (!judged) return;
   const auto most = static_cast<std::size_t>(feed_.options().tracker.max_detections);
   if (boxes_.size() > most) boxes_.resize(most);

@@ -17,6 +17,7 @@
 #include "core/detection/network_detector.h"
 #include "core/detection/person_detector.h"
 #include "edge_app/taps/detector_tap.h"
+#include "edge_app/tracking/detector_kinds.h"
 #include "edge_app/tracking/target_feed.h"
 
 namespace alidade {
@@ -33,7 +34,8 @@ struct BuiltInDetectorOptions {
   std::optional<PersonOptions> people;  // needs a plane; empty: off
   std::optional<NetworkFiles> onnx;     // empty: off
 
-  [[nodiscard]] bool any() const { return motion || people || onnx; }
+  [[nodiscard]] bool has(DetectorKind kind) const;
+  [[nodiscard]] bool any() const;
 };
 
 struct DetectorCounters {
@@ -44,7 +46,7 @@ struct DetectorCounters {
 
 struct DetectorsReport {
   std::int64_t replaced = 0;  // pictures replaced by newer ones before they were looked at
-  std::optional<DetectorCounters> motion, people, onnx;
+  OfDetectors<std::optional<DetectorCounters>> counters;  // empty: off
 };
 
 class BuiltInDetectors : public FrameDetector {
@@ -64,13 +66,15 @@ class BuiltInDetectors : public FrameDetector {
 
  private:
   // False: the picture could not be judged.
+  [[nodiscard]] bool find(DetectorKind kind, const ImageView& image,
+                          const FrameOrientation& orientation);
   [[nodiscard]] bool find_by_network(const ImageView& image);
   [[nodiscard]] bool find_people(const ImageView& image, const FrameOrientation& orientation);
   [[nodiscard]] bool find_motion(const ImageView& image, const FrameOrientation& orientation);
   // Adds those boxes that lie on nothing found before, after finish(&box).
   template <typename Finish>
   void take(const std::vector<DetectionBox>& found, Finish&& finish);
-  void count(std::optional<DetectorCounters>* counters, bool judged, std::size_t boxes);
+  void count(DetectorKind kind, bool judged, std::size_t boxes);
 
   const BuiltInDetectorOptions options_;
   const std::shared_ptr<const PlaneEstimate> plane_;

@@ -11,6 +11,10 @@
 
 namespace alidade {
 
+// Landmarks and telemetry exclude each other beyond this chi-square (2 degrees of freedom: six
+// standard deviations). The solution and the filter of the map's offset use the same.
+inline constexpr double kMaxContradiction = 36;
+
 using Vector6 = Matrix<double, 6, 1>;
 using Matrix6 = Matrix<double, 6, 6>;
 

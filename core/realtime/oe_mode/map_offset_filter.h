@@ -27,7 +27,8 @@ struct MapOffsetOptions {
   double lens_drift = 1e-7;  // 1 / sqrt(s), >= 0; of log f at rest, by heat
   // s, >= 0; correlation time of the common error of the landmarks in view.
   double shared_correlation_time_s = 10;
-  double max_contradiction = 36;  // chi-square, 2 degrees of freedom, > 0; gate of an innovation
+  // Chi-square, 2 degrees of freedom, > 0; gate of an innovation.
+  double max_contradiction = kMaxContradiction;
 
   // False if a value is invalid. *error, if not null, then says which in one line.
   [[nodiscard]] bool validate(const char** error = nullptr) const;

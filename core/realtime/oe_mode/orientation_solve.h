@@ -132,8 +132,8 @@ struct SolvedMotion {
 struct SolveLimits {
   int min_inliers = 8;
   double min_inlier_share = 0.3;
-  double max_contradiction = 36;  // chi-square
-  double max_scale = 30;          // largest factor of residuals over their standard deviation
+  double max_contradiction = kMaxContradiction;  // chi-square
+  double max_scale = 30;  // largest factor of residuals over their standard deviation
   double min_half_readout_s = 1e-3;
 };
 
