@@ -10,7 +10,7 @@
 //                             not localized (SceneStart)
 //   RealtimeStage             images too late to be looked at
 // If OE mode is asked for, kOk occurs in mode OE only. What each means to a user and what to do:
-// edge_app/README.md.
+// docs/records.md.
 
 #include <array>
 #include <cstddef>

@@ -8,6 +8,7 @@
 
 #include <cstdlib>
 #include <fstream>
+#include <iterator>
 #include <string>
 
 #include "edge_app/config/nearest_word.h"
@@ -1072,6 +1073,35 @@ TEST(NoiseFile, GivesItsValuesAndNamesItsMistakes) {
       directory.write("noise.yaml", "pixel_sigma_px: 0.3\nimage_stamp_sigma_s: small\n");
   EXPECT_FALSE(load_noise(directory.path(), &noise, &error));
   EXPECT_THAT(error, StartsWith(path + ":2: image_stamp_sigma_s: 'small' is not a plain number"));
+}
+
+std::string manual(const char* page) {
+  std::ifstream file(std::string(ALIDADE_MANUAL) + "/" + page);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+TEST(VideoTypes, AreInTheManual) {
+  const std::string page = manual("configuration.md");
+  for (const char* name : video_type_names())
+    EXPECT_NE(page.find("\n`type: " + std::string(name) + "`"), std::string::npos) << name;
+}
+
+TEST(VideoTypes, AreAllNamedToWhoMistypesOne) {
+  Config config;
+  std::string error;
+  EXPECT_FALSE(parse_config("video: {url: x}\n", "x.yaml", &config, &error, ConfigScope::kVideo));
+  for (const char* name : video_type_names())
+    EXPECT_NE(error.find(name), std::string::npos) << name << ": " << error;
+}
+
+TEST(Detectors, AreInTheManual) {
+  const std::string page = manual("configuration.md");
+  std::ifstream file(ALIDADE_EXAMPLE);
+  const std::string example(std::istreambuf_iterator<char>(file), {});
+  for (const DetectorKindRow& row : kDetectorKinds) {
+    EXPECT_NE(page.find("`" + std::string(row.name) + "`"), std::string::npos) << row.name;
+    EXPECT_NE(example.find("\n#   " + std::string(row.name) + ":"), std::string::npos) << row.name;
+  }
 }
 
 }  // namespace

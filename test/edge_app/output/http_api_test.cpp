@@ -569,7 +569,9 @@ TEST_F(HttpApiWithTargetsTest, TellsTargetsWhenAskedAndAsEvents) {
   start();
   // In the past when the newest came: what is late is taken.
   for (std::int64_t i = 20; i < 49; ++i)
-    if (i != 30) ASSERT_THAT(send_frame(i), StartsWith("HTTP/1.1 202 ")) << i;
+    if (i != 30) {
+      ASSERT_THAT(send_frame(i), StartsWith("HTTP/1.1 202 ")) << i;
+    }
   ASSERT_THAT(send_frame(30), StartsWith("HTTP/1.1 202 "));
   json targets;
   do {

@@ -205,7 +205,9 @@ TEST_F(HttpCrowdTest, TheTokenGoesFirstAndThenWhoHasFewestWaiting) {
   EXPECT_THAT(ask("127.0.0.4", get("/nothing")), StartsWith("HTTP/1.1 404 "));  // all are in
   released_ = 1;
   for (const auto& client : clients_) {
-    if (client != clients_[1]) EXPECT_THAT(client->receive(), StartsWith("HTTP/1.1 200 "));
+    if (client != clients_[1]) {
+      EXPECT_THAT(client->receive(), StartsWith("HTTP/1.1 200 "));
+    }
   }
   std::vector<std::string> order(begun_.begin() + 2, begun_.end());
   EXPECT_THAT(order, ElementsAre("token", "another", "a", "b", "c"));

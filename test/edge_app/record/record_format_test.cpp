@@ -160,5 +160,14 @@ TEST(RecordFormat, EveryStatusHasWordsWithoutACommaOrQuote) {
   }
 }
 
+TEST(Statuses, AreInTheManual) {
+  std::ifstream file(std::string(ALIDADE_MANUAL) + "/records.md");
+  const std::string page(std::istreambuf_iterator<char>(file), {});
+  for (const RecordStatus status : kRecordStatuses) {
+    EXPECT_NE(page.find("\n| `" + std::string(to_string(status)) + "` | "), std::string::npos)
+        << to_string(status);
+  }
+}
+
 }  // namespace
 }  // namespace alidade

@@ -265,7 +265,9 @@ TEST(TargetStage, LateFramesGiveWhatTheRightOrderHadGiven) {
   TargetStage in_order(plane_options(), mast_plane());
   for (std::int64_t i = 0; i < 80; ++i) {
     ASSERT_EQ(in_order.add(walker_seen(i)).status, DetectionStatus::kTaken);
-    if (i != 35) ASSERT_EQ(late.add(walker_seen(i)).status, DetectionStatus::kTaken);
+    if (i != 35) {
+      ASSERT_EQ(late.add(walker_seen(i)).status, DetectionStatus::kTaken);
+    }
   }
   EXPECT_EQ(late.add(walker_seen(35)).status, DetectionStatus::kTakenLate);
   const TargetsState a = late.state();
@@ -291,7 +293,9 @@ TEST(TargetStage, ATargetHasTheClassThatMostOfItsDetectionsHave) {
     frame.boxes[0].name = i % 3 == 2 ? "bicycle" : "person";
     ASSERT_EQ(stage.add(frame).status, DetectionStatus::kTaken);
     const auto targets = stage.state().targets;
-    if (i > 5) EXPECT_EQ(targets.at(0).look.name, "person") << i;
+    if (i > 5) {
+      EXPECT_EQ(targets.at(0).look.name, "person") << i;
+    }
   }
   for (std::int64_t i = 40; i < 60; ++i) {
     DetectedFrame frame = walker_seen(i);
@@ -316,8 +320,9 @@ TEST(TargetReport, MovesToAnotherFrameAndItsLens) {
     EXPECT_NEAR(reports[0].box->height, 66, 1);
     EXPECT_NEAR(reports[0].box->foot().y(), reports[0].pixel->y(), 1e-9);
     EXPECT_GT(Eigen::SelfAdjointEigenSolver<Matrix4<double>>(reports[0].cov).eigenvalues()[0], 0);
-    if (number != 99)
+    if (number != 99) {
       EXPECT_GT(reports[0].cov.trace(), report_targets(state, state.record)[0].cov.trace());
+    }
   }
   // Turned away: its place is known, its pixel is none.
   const FrameOrientation away = test::watching_frame(zoomed, 2.5, -0.2);
