@@ -39,12 +39,12 @@ TEST(BuiltInDetectors, TellTheFeedWhatMovesAndNothingOfPicturesThatTheyCannotJud
     detectors.look(panned_frame(orientation, i, image.view));
   }
   const DetectorsReport report = detectors.report();
-  EXPECT_FALSE(report.people);
-  ASSERT_TRUE(report.motion);
-  EXPECT_EQ(report.motion->pictures, kFrames);
+  EXPECT_FALSE(report.counters[DetectorKind::kPeople]);
+  ASSERT_TRUE(report.counters[DetectorKind::kMotion]);
+  EXPECT_EQ(report.counters[DetectorKind::kMotion]->pictures, kFrames);
   // Two pictures before it are what one is compared with.
-  EXPECT_EQ(report.motion->unjudged, 2);
-  EXPECT_GT(report.motion->boxes, 0);
+  EXPECT_EQ(report.counters[DetectorKind::kMotion]->unjudged, 2);
+  EXPECT_GT(report.counters[DetectorKind::kMotion]->boxes, 0);
   EXPECT_EQ(feed.snapshot().waiting, static_cast<std::size_t>(kFrames - 2));
 }
 
@@ -56,7 +56,7 @@ TEST(BuiltInDetectors, APictureTooSmallIsNotJudged) {
   const std::vector<std::uint8_t> luma(32 * 32);
   detectors.look(
       panned_frame(test::PanningCamera().orientation(0), 0, ImageView{luma.data(), 32, 32, 32}));
-  EXPECT_EQ(detectors.report().motion->unjudged, 1);
+  EXPECT_EQ(detectors.report().counters[DetectorKind::kMotion]->unjudged, 1);
   EXPECT_EQ(feed.snapshot().waiting, 0U);
 }
 
@@ -101,11 +101,12 @@ TEST(BuiltInDetectors, WhatANetworkFindsIsNoMoverAgain) {
     }
   }
   const DetectorsReport report = detectors.report();
-  ASSERT_TRUE(report.onnx && report.motion);
-  EXPECT_LT(handed_over, report.onnx->boxes + report.motion->boxes);
-  EXPECT_EQ(report.onnx->pictures, kFrames);
-  EXPECT_EQ(report.onnx->unjudged, 0);
-  EXPECT_GT(report.onnx->boxes, 0);
+  ASSERT_TRUE(report.counters[DetectorKind::kOnnx] && report.counters[DetectorKind::kMotion]);
+  EXPECT_LT(handed_over, report.counters[DetectorKind::kOnnx]->boxes +
+                             report.counters[DetectorKind::kMotion]->boxes);
+  EXPECT_EQ(report.counters[DetectorKind::kOnnx]->pictures, kFrames);
+  EXPECT_EQ(report.counters[DetectorKind::kOnnx]->unjudged, 0);
+  EXPECT_GT(report.counters[DetectorKind::kOnnx]->boxes, 0);
   // The network could judge those, too, that motion could not.
   EXPECT_EQ(feed.snapshot().waiting, static_cast<std::size_t>(kFrames));
 }
