@@ -1,7 +1,7 @@
 #pragma once
 // Generated from edge_app/record/record_fields.yaml by scripts/generate-fields: change the list instead.
 //
-// add_fields(): all fields of a record in their order, each told to a line by add(name, value),
+// add_fields(): passes all fields of a record, in their order, to a line: add(name, value),
 // add(name, columns, values) or add_object(name, keys, values).
 
 #include <array>
