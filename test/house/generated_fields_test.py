@@ -72,6 +72,8 @@ class GeneratedFields(unittest.TestCase):
                             (NEW.replace("type: number", "type: angle"), "sun_rad: type is angle; it may be array, "),
                             (NEW.replace("type: number", "type: array"), "sun_rad: an array has columns"),
                             (NEW.replace("sun_rad", "zoom"), "zoom stands there twice"),
+                            (NEW.replace("type: number", "type: integer"), "sun_rad: an integer that may be null has ros: as: presence"),
+                            (NEW.replace("type: number", "type: boolean"), "sun_rad: a field of type boolean cannot be null"),
                             ("- [", "generate-fields: ")):
             with self.subTest(told=told):
                 text = self.list.read_text()

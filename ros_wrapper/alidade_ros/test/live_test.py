@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Virtual camera -> edge executable -> node, run by rostest (live.test): what comes out is what the edge says, once."""
 import math
+import pathlib
 import signal
 import sys
 import xmlrpc.client
@@ -9,6 +10,7 @@ import rosgraph
 import rospy
 import rostest
 import tf2_py
+import yaml
 from alidade_msgs.msg import Box, Calibration, Detection, Detections, FrameOrientation, Pixel, Status, Targets
 from alidade_msgs.srv import (Calibrate, DirectionToPixel, DirectionToPixelRequest, PixelToDirection,
                               PixelToDirectionRequest)
@@ -22,17 +24,28 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 FRAMES = 500
 CLOCK_S = 1e-5  # by which the wall clock of a frame may become better known after its message
-SCALARS = {  # field of the message: field of the record, factor
-    "frame": ("frame", 1), "time": ("time_s", 1), "time_sigma": ("time_sigma_s", 1),
-    "receive_time": ("receive_time_s", 1), "latency": ("latency_s", 1),
-    "status": ("status", None), "calibrated": ("calibrated", 1), "calibration": ("calibration", None),
-    "reference_row": ("reference_row", 1), "pan": ("pan_rad", -1), "tilt": ("tilt_rad", -1),
-    "pan_rate": ("pan_rate_rad_s", -1), "tilt_rate": ("tilt_rate_rad_s", -1),
-    "pan_acceleration": ("pan_acceleration_rad_s2", -1), "tilt_acceleration": ("tilt_acceleration_rad_s2", -1),
-    "landmarks": ("landmarks", 1), "residual": ("residual_px", 1), "line_delay": ("line_delay_s", 1),
-    "focal_length": ("focal_length_px", 1), "focal_length_sigma": ("focal_length_sigma_px", 1), "zoom": ("zoom", 1),
-    "zoom_rate": ("zoom_rate_per_s", 1), "zoom_rate_sigma": ("zoom_rate_sigma_per_s", 1), "aspect": ("aspect", 1),
-    "radial_distortion": ("radial_distortion", 1)}
+LIST = pathlib.Path(__file__).resolve().parents[3] / "edge_app/record/record_fields.yaml"
+
+
+def scalars_of(fields):
+    """Field of the message -> how its value is taken from a record, and its factor; None: a word."""
+    scalars = {}
+    for field in fields:
+        name, ros = field["name"], field["ros"]
+        kind = ros.get("as", "same")
+        if kind == "pair":
+            for i, one in enumerate(ros["names"]):
+                scalars[one] = (lambda record, name=name, i=i: record[name][i], 1)
+        elif kind == "members":
+            for one, member in zip(ros["names"], field["members"]):
+                scalars[one] = (lambda record, name=name, key=member["name"]: record[name] and record[name][key], 1)
+        elif kind in ("same", "turned", "presence") and field["type"] != "array" and name != "needs":
+            factor = {"turned": -1, "same": None if field["type"] == "word" else 1, "presence": 1}[kind]
+            scalars[ros["name"]] = (lambda record, name=name: record[name], factor)
+    return scalars
+
+
+SCALARS = scalars_of(yaml.safe_load(LIST.read_text()))
 
 
 def conjugate_rotate(q, v):
@@ -66,8 +79,8 @@ class Live(RosTest):
     def assert_is_the_record(self, message, edge):
         record = edge.record(message.record)
         self.assertEqual(message.has_frame, record["frame"] is not None)
-        for field, (name, factor) in SCALARS.items():
-            value, expected = getattr(message, field), record[name]
+        for field, (take, factor) in SCALARS.items():
+            value, expected = getattr(message, field), take(record)
             if expected is None:
                 self.assertTrue(field == "frame" or math.isnan(value), field)
             else:

@@ -11,7 +11,7 @@ const char* const kRecord =
         "tilt_rate_rad_s":0.4,"pan_acceleration_rad_s2":0.5,"tilt_acceleration_rad_s2":0.6,
         "q_base_from_camera":[0.5,0.5,0.5,0.5],"orientation_covariance_rad2":[1,2,3,4,5,6,7,8,9],
         "reference_row":0,"landmarks":40,"residual_px":0.08,"line_delay_s":1e-5,"focal_length_px":2600,
-        "aspect":1,"radial_distortion":13.9,"latency_s":0.002,"telemetry_age_s":-0.01,"zoom":3000,"zoom_rate_per_s":0.25,"zoom_rate_sigma_per_s":0.01,"focal_length_sigma_px":1.5,"time_sigma_s":0.02,"of_a_newer_edge":[]})";
+        "aspect":1,"radial_distortion":13.9,"latency_s":0.002,"telemetry_age_s":-0.01,"zoom":3000,"zoom_rate_per_s":0.25,"zoom_rate_sigma_per_s":0.01,"focal_length_sigma_px":1.5,"time_sigma_s":0.02,"centre_offset_px":[3,-4],"localized":{"age_s":2.5,"sigma_rad":1e-5},"of_a_newer_edge":[]})";
 
 TEST(Record, IsReadWhole) {
   Record record;
@@ -32,6 +32,10 @@ TEST(Record, IsReadWhole) {
   EXPECT_EQ(record.zoom_rate_sigma_per_s, 0.01);
   EXPECT_EQ(record.focal_length_sigma_px, 1.5);
   EXPECT_EQ(record.radial_distortion, 13.9);
+  EXPECT_EQ(record.centre_offset_px[1], -4);
+  ASSERT_TRUE(record.localized);
+  EXPECT_EQ(record.localized->age_s, 2.5);
+  EXPECT_EQ(record.localized->sigma_rad, 1e-5);
 }
 
 TEST(Record, MayBeOfNoFrame) {
@@ -49,6 +53,8 @@ TEST(Record, MayBeOfNoFrame) {
   EXPECT_FALSE(record.time_sigma_s);
   EXPECT_FALSE(record.zoom);
   EXPECT_FALSE(record.zoom_rate_per_s);
+  EXPECT_FALSE(record.localized);
+  EXPECT_EQ(record.centre_offset_px[0], 0);
   EXPECT_EQ(record.needs, "pan more");
 }
 
