@@ -46,7 +46,7 @@ void read_tls_files(YamlSection& section, const std::string& config_path, MqttOp
 }
 
 std::string read_prefix(YamlSection& section, const std::string& usual) {
-  const std::string prefix = section.text("prefix").value_or(usual);
+  std::string prefix = section.text("prefix").value_or(usual);
   constexpr std::size_t kLongest = 200;
   const bool is_topic = !prefix.empty() && prefix.size() <= kLongest && prefix.front() != '/' &&
                         prefix.front() != '$' && prefix.back() != '/' &&
