@@ -43,10 +43,12 @@ class Load final : public FrameDetector, public Beside {
     found_.stop();
     crowd_.stop();
     const DetectorsReport report = detectors_.report();
+    const DetectorCounters& motion = *report.counters[DetectorKind::kMotion];
+    const DetectorCounters& people = *report.counters[DetectorKind::kPeople];
     const auto newest = crowd_.snapshot().newest;
     return {{"pictures", pictures_},
-            {"motion_judged", report.motion->pictures - report.motion->unjudged},
-            {"people_judged", report.people->pictures - report.people->unjudged},
+            {"motion_judged", motion.pictures - motion.unjudged},
+            {"people_judged", people.pictures - people.unjudged},
             {"boxes_a_picture", static_cast<double>(boxes_) / static_cast<double>(pictures_)},
             {"targets", newest ? newest->targets.size() : 0},
             {"tracked_frames", crowd_.snapshot().counters.of(DetectionStatus::kTaken)}};

@@ -5,10 +5,10 @@
 //   light        the sun turns once a day: descriptors change, blobs move by a part of a pixel, some things are there for hours only
 //   cars         groups of things that stand for hours in one half of a view
 //   trees        things in the right half that sway together, slowly; with `bare` nothing lasting stands there
-//   shadows      things that wander by pixels in a minute, each day the same way, further along it with the season
+//   shadows      things that move by pixels in a minute, along the same path every day; with the season each hour's place moves along it
 //   season       the sun of an hour comes earlier from day to day
 //   fog          hours in which next to nothing is seen
-// What is matched with the map is found by descriptors near the place where telemetry looks for it; poses are find_pose()'s.
+// Matches with the map are found by descriptors, near the place that telemetry predicts. find_pose() gives the poses.
 
 #include <algorithm>
 #include <array>
@@ -38,7 +38,7 @@ struct ChangingSceneOptions {
   int cars = 2;             // groups of 20 at a time in a view
   double shadows = 0.1;     // share of things that wander
   double season_px = 0;     // that shadows fall further along their way, in 30 days
-  double season_hours = 0;  // by which the light of an hour comes earlier, likewise
+  double season_hours = 0;  // by which the same light comes earlier, in 30 days
   bool fog = true;
   int trees = 0;      // things in a view
   bool bare = false;  // the right 60 % of each view hold trees and nothing else
@@ -327,8 +327,8 @@ struct SceneDay {
   int refused = 0;
   double matches = 0;   // mean of those with a pose
   double error_px = 0;  // root mean square of the image centre's direction
-  double drift_px =
-      0;  // largest of the places: the mean error of the day against that of the first day
+  // The mean error of this day minus that of the first day, of the place where it is largest.
+  double drift_px = 0;
   double sigma_px = 0;  // claimed: the pose's covariance with the common part of its landmarks
   int landmarks = 0;    // at the end
   int candidates = 0;   // to become landmarks, the most
@@ -341,8 +341,8 @@ struct SceneDay {
 struct SceneRunOptions {
   bool upkeep = true;
   UpkeepOptions options;
-  // Where the map is kept: called with the map as it begins and no change, then with each change before it is applied. The size of what is
-  // kept, bytes; none: it could not be kept, and that is the end.
+  // Stores the map: called first with the whole map and no change, then with each change before it is applied.
+  // Returns the size of the store, bytes; none: it could not be stored, and the run ends.
   std::function<std::optional<std::int64_t>(const SceneMap& map, const MapChange& change)> keep;
 };
 

@@ -25,7 +25,8 @@ class SimulatedHead {
   virtual ~SimulatedHead() = default;
 
   virtual void power_on() { received_.clear(); }
-  // Answers to what is complete of the bytes so far, the position as it is now; none is empty.
+  // Answers to all queries that are complete with these bytes, with the present position. No answer is
+  // empty.
   virtual std::vector<std::string> take(const std::string& bytes) = 0;
   // Something that nobody asked for.
   virtual std::string unsolicited() = 0;
@@ -58,9 +59,11 @@ struct ViscaHead : SimulatedHead {
   // The sequence number of an answer, as devices other than Sony's have it.
   enum class Numbers { kOfTheQuery, kOne, kZero, kOneLess, kOneMore, kTurnedRound, kNoHeader };
   Numbers numbers = Numbers::kOfTheQuery;
-  unsigned highest_number =
-      0;  // it answers no query of a higher one, and minds none that comes again; 0: any
-  bool error_is_reply = false;  // of type 0201 rather than 0200: about a sequence number
+  // Queries with a higher sequence number get no answer; a number may come again. 0: all are answered.
+  unsigned highest_number = 0;
+  // Errors about a sequence number have the payload type of a control reply (0201), not of a control
+  // command (0200).
+  bool error_is_reply = false;
   std::atomic<bool> forgets_numbering{false};  // until it is begun anew
   int error = 0;                               // code that answers every query; 0: none
 
