@@ -104,8 +104,8 @@ LiveTargets::LiveTargets(const Config& config, std::shared_ptr<const PlaneEstima
   tap_.emplace(detectors_.emplace(config.detectors, std::move(plane),
                                   load_network(config.detectors.onnx), feed_));
   std::string names;
-  for (const DetectorKindRow& row : kDetectorKinds) {
-    if (config.detectors.has(row.kind)) names += std::string(" ") + row.name;
+  for (auto row = kDetectorKinds.rbegin(); row != kDetectorKinds.rend(); ++row) {
+    if (config.detectors.has(row->kind)) names += std::string(" ") + row->name;
   }
   spdlog::info("detectors:{}", names);
 }

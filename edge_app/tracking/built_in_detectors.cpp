@@ -129,8 +129,8 @@ void BuiltInDetectors::look(const DetectableFrame& frame) {
   if (!complete_orientation(frame.record, &orientation)) return;
   boxes_.clear();
   bool judged = false;
-  for (const DetectorKindRow& row : kDetectorKinds) {
-    if (options_.has(row.kind)) judged = find(row.kind, frame.image, orientation) || judged;
+  for (auto row = kDetectorKinds.rbegin(); row != kDetectorKinds.rend(); ++row) {
+    if (options_.has(row->kind)) judged = find(row->kind, frame.image, orientation) || judged;
   }
   if (!judged) return;
   const auto most = static_cast<std::size_t>(feed_.options().tracker.max_detections);

@@ -8,7 +8,7 @@
 
 namespace alidade {
 
-enum class DetectorKind { kOnnx, kPeople, kMotion, kCount };
+enum class DetectorKind { kMotion, kPeople, kOnnx, kCount };
 
 inline constexpr auto kDetectorKindCount = static_cast<std::size_t>(DetectorKind::kCount);
 
@@ -18,11 +18,12 @@ struct DetectorKindRow {
   bool needs_ground;  // requires tracking.plane
 };
 
-// In the order in which they look at a picture: what an earlier one has found is left out later.
+// They look at a picture from the last row to the first: what a later row has found is left out in
+// those before it.
 inline constexpr std::array<DetectorKindRow, kDetectorKindCount> kDetectorKinds = {
-    {{DetectorKind::kOnnx, "onnx", false},
+    {{DetectorKind::kMotion, "motion", false},
      {DetectorKind::kPeople, "people", true},
-     {DetectorKind::kMotion, "motion", false}}};
+     {DetectorKind::kOnnx, "onnx", false}}};
 
 constexpr bool detector_kinds_are_in_order() {
   for (std::size_t i = 0; i < kDetectorKindCount; ++i) {

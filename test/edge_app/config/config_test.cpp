@@ -776,7 +776,7 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"PeopleWithoutGround", MINIMAL "tracking: {}\ndetectors: {people: {}}\n",
                 ":5: detectors.people", "add tracking.plane"},
         Mistake{"UnknownDetector", MINIMAL "detectors: {birds: {}}\n", ":4: detectors.birds",
-                "known here: onnx, people, motion"},
+                "known here: motion, people, onnx"},
         Mistake{"LeastAboveMost",
                 MINIMAL "tracking: {}\ndetectors:\n  motion:\n    least_size_px: 300\n",
                 ":7: detectors.motion.least_size_px", "leaves 300 to 200 px"},
