@@ -174,48 +174,43 @@ std::int64_t most_pixels(const VideoConfig& config) {
   return config.width > 0 ? std::int64_t{config.width} * config.height : kMostLivePixels;
 }
 
-RtpSourceOptions rtp_options(const VideoConfig& config, bool decode, const std::string& copy_to) {
-  RtpSourceOptions options;
+// The options that all live sources share.
+template <class Options>
+Options live_options(const VideoConfig& config, bool decode, const std::string& copy_to) {
+  Options options;
+  options.decode = decode;
+  options.timeout_s = config.timeout_s;
+  options.max_backoff_s = config.max_backoff_s;
+  options.copy_to = copy_to;
+  return options;
+}
+
+// Those that sources behind a URL share.
+template <class Options>
+Options streamed_options(const VideoConfig& config, bool decode, const std::string& copy_to) {
+  auto options = live_options<Options>(config, decode, copy_to);
   options.url = config.url;
   options.user = config.user;
   options.password = config.password;
   options.rules = config.rules;
+  options.max_pixels = most_pixels(config);
+  return options;
+}
+
+RtpSourceOptions rtp_options(const VideoConfig& config, bool decode, const std::string& copy_to) {
+  auto options = streamed_options<RtpSourceOptions>(config, decode, copy_to);
   options.format = config.format;
   options.transport = config.transport == VideoConfig::Transport::kUdp
                           ? RtpSourceOptions::Transport::kUdp
                           : RtpSourceOptions::Transport::kTcp;
   options.certificate_file = config.certificate_file;
-  options.decode = decode;
-  options.timeout_s = config.timeout_s;
-  options.max_backoff_s = config.max_backoff_s;
-  options.max_pixels = most_pixels(config);
-  options.copy_to = copy_to;
-  return options;
-}
-
-MjpegSourceOptions mjpeg_options(const VideoConfig& config, bool decode,
-                                 const std::string& copy_to) {
-  MjpegSourceOptions options;
-  options.url = config.url;
-  options.user = config.user;
-  options.password = config.password;
-  options.rules = config.rules;
-  options.decode = decode;
-  options.timeout_s = config.timeout_s;
-  options.max_backoff_s = config.max_backoff_s;
-  options.max_pixels = most_pixels(config);
-  options.copy_to = copy_to;
   return options;
 }
 
 V4l2SourceOptions v4l2_options(const VideoConfig& config, bool decode, const std::string& copy_to) {
-  V4l2SourceOptions options;
+  auto options = live_options<V4l2SourceOptions>(config, decode, copy_to);
   options.device = config.device;
   options.wish = {config.pixel_format, config.width, config.height, config.rate_hz};
-  options.decode = decode;
-  options.timeout_s = config.timeout_s;
-  options.max_backoff_s = config.max_backoff_s;
-  options.copy_to = copy_to;
   return options;
 }
 
@@ -228,7 +223,7 @@ std::unique_ptr<FrameSource> make_frame_source(const VideoConfig& config, bool d
     case VideoConfig::Type::kRtp:
       return open_rtp(rtp_options(config, decode, copy_to));
     case VideoConfig::Type::kMjpeg:
-      return open_mjpeg(mjpeg_options(config, decode, copy_to));
+      return open_mjpeg(streamed_options<MjpegSourceOptions>(config, decode, copy_to));
     case VideoConfig::Type::kV4l2:
       return open_v4l2(v4l2_options(config, decode, copy_to));
     case VideoConfig::Type::kRecording:

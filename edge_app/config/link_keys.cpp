@@ -22,6 +22,13 @@ std::string required_text(YamlSection& section, const std::string& key,
   return *value;
 }
 
+std::string required_choice(YamlSection& section, const std::string& key,
+                            const std::vector<std::string>& names) {
+  std::optional<std::string> name = section.choice(key, names);
+  if (!name) section.fail_missing(key, "expected one of " + join(names));
+  return *std::move(name);
+}
+
 std::string required_url(YamlSection& section, const std::string& example,
                          const std::vector<std::string>& schemes) {
   std::string url = required_text(section, "url", example);

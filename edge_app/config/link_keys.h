@@ -18,6 +18,10 @@ inline constexpr NumberRange kSeconds{0.1, 3600, "s"};
 [[nodiscard]] std::string required_text(YamlSection& section, const std::string& key,
                                         const std::string& example);
 
+// One of the names.
+[[nodiscard]] std::string required_choice(YamlSection& section, const std::string& key,
+                                          const std::vector<std::string>& names);
+
 // An address with one of the given schemes and without a user or password in it.
 [[nodiscard]] std::string required_url(YamlSection& section, const std::string& example,
                                        const std::vector<std::string>& schemes);

@@ -94,10 +94,9 @@ PanTiltType read_pan_tilt_type(YamlSection& section) {
   std::vector<std::string> keys(types.size());
   std::transform(types.begin(), types.end(), keys.begin(),
                  [](const PanTiltType& type) { return type.key; });
-  const std::optional<std::string> key = section.choice("type", keys);
-  if (!key) section.fail_missing("type", "expected one of " + join(keys));
+  const std::string key = required_choice(section, "type", keys);
   return *std::find_if(types.begin(), types.end(),
-                       [&](const PanTiltType& type) { return type.key == *key; });
+                       [&](const PanTiltType& type) { return type.key == key; });
 }
 
 // The keys of all devices that are polled over HTTP.

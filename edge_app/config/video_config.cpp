@@ -1,7 +1,6 @@
 #include "edge_app/config/video_config.h"
 
 #include <algorithm>
-#include <vector>
 
 #include "edge_app/config/link_keys.h"
 #include "platform/streams/picture_size.h"
@@ -103,15 +102,10 @@ const std::array<const char*, kVideoTypeCount>& video_type_names() {
 
 VideoConfig read_video(YamlSection section, const std::string& config_path) {
   const auto& names = video_type_names();
-  const auto type = section.choice("type", {names.begin(), names.end()});
-  if (!type) {
-    std::string all;
-    for (const char* name : names) all += (all.empty() ? "" : ", ") + std::string(name);
-    section.fail_missing("type", "expected one of " + all);
-  }
+  const std::string type = required_choice(section, "type", {names.begin(), names.end()});
   const VideoTypeRow& row =
       *std::find_if(kVideoTypes.begin(), kVideoTypes.end(),
-                    [&type](const VideoTypeRow& one) { return *type == one.name; });
+                    [&type](const VideoTypeRow& one) { return type == one.name; });
   VideoConfig video;
   video.type = row.type;
   row.read(section, config_path, &video);
