@@ -4,13 +4,11 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <memory>
 #include <mutex>
 #include <nlohmann/json.hpp>
 
 #include "edge_app/output/calibration_json.h"
-#include "edge_app/output/clock_pair.h"
 #include "edge_app/output/detection_query.h"
 #include "edge_app/output/openapi.h"
 #include "edge_app/output/or_null.h"
@@ -19,6 +17,7 @@
 #include "edge_app/output/record_events.h"
 #include "edge_app/output/scene_json.h"
 #include "edge_app/output/service_metrics.h"
+#include "edge_app/output/service_status.h"
 #include "edge_app/output/targets_json.h"
 #include "edge_app/record/record_format.h"
 #include "platform/system/clock.h"
@@ -281,118 +280,6 @@ ServerResponse targets(const HttpApiSources& sources, const ServerRequest& reque
   return json_response(out);
 }
 
-Json quantiles(const LatencyHistogram& histogram) {
-  if (histogram.total() == 0) return nullptr;
-  return {{"p50", histogram.quantile(0.5)},
-          {"p90", histogram.quantile(0.9)},
-          {"p99", histogram.quantile(0.99)},
-          {"max", histogram.longest_s()}};
-}
-
-Json link_json(const LinkHealth& link) {
-  return {{"connected", link.connected},
-          {"reason", link.reason.empty() ? Json() : Json(link.reason)},
-          {"reconnections", link.reconnections},
-          {"age_s", or_null(link.age_s)},
-          {"rate_hz", or_null(link.rate_hz)}};
-}
-
-Json detectors_json(const DetectorsReport& report) {
-  Json out{{"replaced", report.replaced}};
-  for (const DetectorKindRow& row : kDetectorKinds) {
-    const std::optional<DetectorCounters>& counters = report.counters[row.kind];
-    out[row.name] = nullptr;
-    if (counters) {
-      out[row.name] = {{"pictures", counters->pictures},
-                       {"unjudged", counters->unjudged},
-                       {"boxes", counters->boxes}};
-    }
-  }
-  return out;
-}
-
-ServerResponse status(const HttpApiSources& sources, const HttpServer& server) {
-  const PipelineSummary summary = sources.summary();
-  const FrameSourceCounters losses = sources.video_losses();
-  const HttpCounters http = server.counters();
-  const auto newest = sources.live->newest();
-  const double now_s = monotonic_now_s();
-  Json out{{"alidade", sources.version},
-           {"start", sources.live->start_id()},
-           {"uptime_s", now_s - sources.live->started_s()},
-           {"camera", sources.camera}};
-  out["clock"] = clock_pair_json();
-  const auto of_newest = [&newest](auto get) { return newest ? Json(get(*newest)) : Json(); };
-  using Record = OrientationRecord;
-  out["mode"] = of_newest([](const Record& r) { return to_string(r.mode); });
-  out["status"] = of_newest([](const Record& r) { return to_string(r.status); });
-  out["telemetry_age_s"] = of_newest([](const Record& r) { return or_null(r.telemetry_age_s); });
-  out["zoom"] = of_newest([](const Record& r) { return or_null(r.zoom); });
-  out["landmarks"] = of_newest([](const Record& r) { return r.landmarks; });
-  out["image"] = {{"width", of_newest([](const Record& r) { return r.camera.width; })},
-                  {"height", of_newest([](const Record& r) { return r.camera.height; })}};
-  const auto since_s = sources.live->calibration_since_s();
-  out["calibration"] = {
-      {"calibrated", newest && newest->calibrated},
-      {"activity", of_newest([](const Record& r) { return to_string(r.calibration.activity); })},
-      {"needs", newest && newest->calibration.need != CalibrationNeed::kNothing
-                    ? Json(to_string(newest->calibration.need))
-                    : Json()},
-      {"age_s", since_s ? Json(now_s - *since_s) : Json()}};
-  out["frames"] = {{"received", summary.frames},
-                   {"records", summary.records},
-                   {"oe", summary.with_landmarks},
-                   {"pt", summary.with_orientation - summary.with_landmarks},
-                   {"none", summary.records - summary.with_orientation},
-                   {"repeated", summary.repeated},
-                   {"damaged", losses.damaged},
-                   {"not_fetched", losses.dropped}};
-  out["video_faults"] = {{"unstamped", losses.unstamped},
-                         {"foreign_packets", losses.foreign_packets},
-                         {"garbage_bytes", losses.garbage_bytes}};
-  out["reasons"] = Json::object();
-  for (const RecordStatus status : kRecordStatuses) {
-    if (summary.reasons.of(status) > 0)
-      out["reasons"][to_string(status)] = summary.reasons.of(status);
-  }
-  out["links"] = {{"video", link_json(summary.video_link)},
-                  {"pan_tilt", link_json(summary.pan_tilt_link)}};
-  out["dropped"] = {{"frames", summary.drops.frames},
-                    {"telemetry", summary.drops.telemetry},
-                    {"records", summary.drops.records},
-                    {"unheard", summary.drops.unheard},
-                    {"late_pictures", summary.drops.late_images}};
-  out["video_clock"] = {{"locked", newest && newest->clock_locked},
-                        {"sigma_s", newest && newest->time_s ? Json(newest->time_sigma_s) : Json()},
-                        {"restarts", summary.clock_restarts},
-                        {"floor_shifts", summary.delay_steps},
-                        {"wander_s", summary.delay_wander_s},
-                        {"left_out_rate_error", or_null(summary.stamps_left_out)}};
-  out["latency_s"] = sources.latency_measured ? quantiles(summary.latency) : Json();
-  if (sources.latency_measured) {
-    out["stages_s"] = {{"decoding", quantiles(summary.decoding)},
-                       {"waiting", quantiles(summary.waiting)},
-                       {"computing", quantiles(summary.computing)},
-                       {"writing", quantiles(summary.writing)}};
-  } else {
-    out["stages_s"] = nullptr;
-  }
-  out["detectors"] = sources.detectors ? detectors_json(sources.detectors()) : Json();
-  out["scene_map"] = sources.scene ? scene_json(sources.scene(), now_s) : Json();
-  out["page_faults"] = {{"minor", summary.page_faults.minor}, {"major", summary.page_faults.major}};
-  Json clients = Json::array();
-  for (const ReaderCounters& reader : sources.live->readers())
-    clients.push_back({{"records", reader.records}, {"lost", reader.lost}});
-  out["streams"] = {{"clients", std::move(clients)},
-                    {"lost_records", sources.live->lost_by_readers()}};
-  out["http"] = {{"requests", http.requests},
-                 {"refused", http.refused},
-                 {"unauthorized", http.unauthorized},
-                 {"stalled", http.stalled},
-                 {"connections", http.connections}};
-  return json_response(out);
-}
-
 }  // namespace
 
 std::shared_ptr<const ZoomCurve> zoom_curve_of(const HttpApiSources& sources) {
@@ -424,8 +311,9 @@ void add_api_routes(HttpServer* server, const HttpApiSources& sources) {
         std::make_unique<RecordEvents>(sources.live, sources.target_lines, sources.version);
     return response;
   });
-  server->get("/api/v1/status", HttpAccess::kToken,
-              [sources, server](const ServerRequest&) { return status(sources, *server); });
+  server->get("/api/v1/status", HttpAccess::kToken, [sources, server](const ServerRequest&) {
+    return json_response(service_status(sources, server->counters()));
+  });
   server->get("/api/v1/history", HttpAccess::kToken,
               [sources](const ServerRequest&) { return history(sources); });
   server->get("/api/v1/calibration", HttpAccess::kToken,

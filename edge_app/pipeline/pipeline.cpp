@@ -6,22 +6,15 @@
 #include <sys/eventfd.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <cerrno>
 #include <system_error>
 #include <utility>
 
 #include "edge_app/pipeline/read_loop.h"
 #include "platform/system/clock.h"
-#include "platform/system/text.h"
 
 namespace alidade {
 namespace {
-
-constexpr double kDropLogInterval_s = 1;
-constexpr double kOldTelemetryLogInterval_s = 60;
-constexpr double kWanderLogInterval_s = 60;
-constexpr double kRepeatedLogInterval_s = 600;
 
 void log_granted(const char* whose, const RealtimeReport& report) {
   spdlog::log(report.warnings.empty() ? spdlog::level::info : spdlog::level::warn, "{}: {}", whose,
@@ -46,6 +39,7 @@ Pipeline::Pipeline(FrameSource& video, PanTiltSource& pan_tilt, RecordSink& sink
              options.scene, options.detectors),
       images_(kImageSlots),
       way_processor_(processor_of_the_way(options)),
+      log_(video, pan_tilt, options.step),
       finished_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
       zoom_curve_(std::make_shared<const ZoomCurve>(options.step.zoom_curve)) {
   if (finished_ < 0) throw std::system_error(errno, std::generic_category(), "eventfd");
@@ -319,7 +313,7 @@ void Pipeline::write_output() {
       if (open) open = sink_.write(message.record);
       const double written_s = monotonic_now_s();
       // Logging comes last, as nobody waits for it.
-      log_events(message);
+      log_.add(message, stage_.drops());
       if (!was_open) continue;
       account_way(message, written_s);
       if (open) continue;
@@ -362,99 +356,6 @@ void Pipeline::count(const OutputMessage& message) {
   if (message.events.video_delay_stepped) ++summary_.delay_steps;
   if (message.record.frame) summary_.delay_wander_s = message.events.video_delay_wander_s;
   if (message.events.stamps_left_out) summary_.stamps_left_out = message.events.stamps_left_out;
-}
-
-// Nothing else in the log says why such records have no telemetry: no connection is known to be
-// lost.
-void Pipeline::log_old_telemetry(const OrientationRecord& record) {
-  if (record.status != RecordStatus::kTelemetryTooOld || !record.telemetry_age_s) return;
-  const double now_s = monotonic_now_s();
-  if (now_s < old_telemetry_logged_at_s_ + kOldTelemetryLogInterval_s) return;
-  constexpr double kReserve = 1.2;
-  constexpr double kWorthTelling_s = 0.05;
-  const double offset_s = record.camera.clock_offset;
-  const std::string later =
-      offset_s > kWorthTelling_s
-          ? fmt::format(
-                " ({:.0f} ms of it, the clock offset, telemetry comes later than the video)",
-                1e3 * offset_s)
-          : "";
-  spdlog::warn(
-      "{}: {} at frame {}: it lies {:.0f} ms beyond the newest angle that is trusted{}, and "
-      "realtime.max_extrapolation_s is {:.0f} ms; raise it to {:.2f} or more if that does not "
-      "grow, or "
-      "raise pan_tilt.rate_hz, or lower pan_tilt.max_repeat_s as far as `alidade check` allows; "
-      "its "
-      "causes, by how telemetry_age_s moves: README of edge_app/config",
-      pan_tilt_.name(), to_string(record.status), *record.frame, 1e3 * *record.telemetry_age_s,
-      later, 1e3 * options_.step.telemetry_limits.max_extrapolation_s,
-      kReserve * *record.telemetry_age_s + 0.005);
-  old_telemetry_logged_at_s_ = now_s;
-}
-
-void Pipeline::log_clock(const OutputMessage& message) {
-  const StepEvents& events = message.events;
-  if (events.stamps_left_out) {
-    const bool counts = events.stamps_count;
-    spdlog::warn(
-        "{}: its time stamps {} at {:.2f} % of the rate at which its pictures come, and are left "
-        "out from frame {} on: a picture's time is known by its arrival, to {:.0f} ms{}; {}",
-        video_.name(), counts ? "count pictures and tell no time: they run" : "run",
-        100 * (1 + *events.stamps_left_out), *message.record.frame,
-        1e3 * options_.step.video_stamp_sigma_s,
-        counts ? ", and less well behind one that is missing" : "",
-        counts ? "set the camera to a rate that it keeps, or its stamps to its clock"
-               : "a camera that counts its stamps at a rate it does not keep may be set to that "
-                 "rate");
-  } else if (events.video_clock_restarted) {
-    spdlog::info("{}: clock filter restarted at frame {}", video_.name(), *message.record.frame);
-  }
-  if (events.video_delay_stepped) {
-    spdlog::warn("{}: the least delay of the video stepped at frame {}; not followed",
-                 video_.name(), *message.record.frame);
-  }
-  if (events.zoom_contradicted) {
-    spdlog::warn(
-        "{}: its zoom reading is not the zoom that the pictures show from frame {} on: it stands "
-        "still, or comes late; pictures are believed as long as landmarks hold",
-        pan_tilt_.name(), *message.record.frame);
-  }
-  const double now_s = monotonic_now_s();
-  if (events.video_delay_wander_s == 0 || now_s < wander_logged_at_s_ + kWanderLogInterval_s)
-    return;
-  spdlog::warn(
-      "{}: time stamps and arrivals of its pictures wander against each other, by {:.0f} ms at "
-      "frame {}: a picture's time is known to that only; is a relay in between?",
-      video_.name(), 1e3 * events.video_delay_wander_s, *message.record.frame);
-  wander_logged_at_s_ = now_s;
-}
-
-void Pipeline::log_repeated(const OrientationRecord& record) {
-  const double now_s = monotonic_now_s();
-  if (record.status != RecordStatus::kImageRepeated ||
-      now_s < repeated_logged_at_s_ + kRepeatedLogInterval_s) {
-    return;
-  }
-  spdlog::warn(
-      "{}: the picture of frame {} is the one before, sent again while the camera turned; such "
-      "pictures are counted and left out; set the camera, converter or grabber to the rate at "
-      "which it takes pictures",
-      video_.name(), *record.frame);
-  repeated_logged_at_s_ = now_s;
-}
-
-void Pipeline::log_events(const OutputMessage& message) {
-  log_repeated(message.record);
-  log_old_telemetry(message.record);
-  log_clock(message);
-  const DropCounters drops = stage_.drops();
-  const double now_s = monotonic_now_s();
-  if (drops.total() == drops_logged_.total() || now_s < drops_logged_at_s_ + kDropLogInterval_s)
-    return;
-  spdlog::warn("queues full: {}, {}, {} dropped so far", counted(drops.frames, "frame"),
-               counted(drops.telemetry, "telemetry sample"), counted(drops.records, "record"));
-  drops_logged_ = drops;
-  drops_logged_at_s_ = now_s;
 }
 
 }  // namespace alidade

@@ -27,6 +27,7 @@
 #include "edge_app/pipeline/latency_histogram.h"
 #include "edge_app/pipeline/link_watch.h"
 #include "edge_app/pipeline/realtime_stage.h"
+#include "edge_app/pipeline/record_log.h"
 #include "edge_app/record/reason_counts.h"
 #include "edge_app/self_calibration/self_calibration.h"
 #include "platform/pan_tilt/pan_tilt_source.h"
@@ -117,10 +118,6 @@ class Pipeline {
   void detect();
   void write_output();
   void count(const OutputMessage& message);
-  void log_events(const OutputMessage& message);
-  void log_old_telemetry(const OrientationRecord& record);
-  void log_clock(const OutputMessage& message);
-  void log_repeated(const OrientationRecord& record);
   void account_way(const OutputMessage& message, double written_s);
   bool push(const Frame& frame);
   [[nodiscard]] std::string size_fault(const Frame& frame) const;
@@ -139,6 +136,7 @@ class Pipeline {
   std::vector<Frame> images_;            // capture thread: by slot, those still in use
   std::vector<ImageSlot> free_slots_;    // capture thread
   int way_processor_;                    // of all threads on a record's way; -1: not shared
+  RecordLog log_;                        // output thread
   int finished_;                         // eventfd
   std::mutex error_mutex_;               // guards error_; never taken by the real-time thread
   std::string error_;                    // of the first thread that failed
@@ -148,11 +146,6 @@ class Pipeline {
   PageFaults page_faults_;                       // real-time thread, at its end
   PageFaults faults_at_start_;           // real-time thread, before it sets realtime_thread_
   std::atomic<int> realtime_thread_{0};  // its id; 0: not running
-  DropCounters drops_logged_;            // output thread
-  double drops_logged_at_s_ = 0;
-  double old_telemetry_logged_at_s_ = -1e9;  // output thread
-  double wander_logged_at_s_ = -1e9;         // output thread
-  double repeated_logged_at_s_ = -1e9;       // output thread
   std::vector<std::thread> threads_;
   pthread_t calibrating_{};  // one of threads_, if there is a calibration
   pthread_t localizing_{};   // one of threads_, if there is a scene map
