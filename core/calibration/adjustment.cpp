@@ -56,12 +56,12 @@ bool Adjustment::reduce(const Linearisation& in, double damping) {
       for (std::size_t j = 0; j <= i; ++j) {
         reduced_.block<2, 2>(row, 2 * touched[j]) -= Y_i * Y.points[j].transpose();
       }
-      reduced_.block<kCameraCount, 2>(camera_row, row) -= Y.camera * Y_i.transpose();
+      reduced_.block<kObservedCount, 2>(camera_row, row) -= Y.camera * Y_i.transpose();
       reduced_g_.segment<2>(row) -= Y_i * Y.gradient;
     }
-    reduced_.block<kCameraCount, kCameraCount>(camera_row, camera_row) -=
+    reduced_.block<kObservedCount, kObservedCount>(camera_row, camera_row) -=
         Y.camera * Y.camera.transpose();
-    reduced_g_.segment<kCameraCount>(camera_row) -= Y.camera * Y.gradient;
+    reduced_g_.segment<kObservedCount>(camera_row) -= Y.camera * Y.gradient;
   });
 }
 
@@ -91,7 +91,7 @@ bool Adjustment::solve(const Linearisation& in, double damping, Eigen::VectorXd*
       (*x_landmark)[l].setZero();
       continue;
     }
-    g -= in.H_camera[l].transpose() * x->segment<kCameraCount>(camera_row);
+    g -= in.H_camera[l].transpose() * x->segment<kObservedCount>(camera_row);
     Matrix2<double> V = in.H_landmark[l];
     V.diagonal() *= 1 + damping;
     (*x_landmark)[l] = V.llt().solve(g);

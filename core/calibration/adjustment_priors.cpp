@@ -29,8 +29,8 @@ PriorKnowledge prior_knowledge(int width, int height, const CalibrationOptions& 
     set(Parameter::kAspect, options.aspect->sigma / options.aspect->value);
   }
   if (options.radial_distortion) {
-    const double unit = mean.camera.distortion_of_corner();
-    mean.distortion = options.radial_distortion->value / unit;
+    const double unit = corner_unit(mean.camera)[0];
+    mean.corner_distortion[0] = options.radial_distortion->value / unit;
     set(Parameter::kRadialDistortion, options.radial_distortion->sigma / unit);
   }
   mean.camera.set_centre_offset(options.centre_offset_px);

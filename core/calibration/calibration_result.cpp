@@ -61,14 +61,16 @@ ParameterCovariance<double> physical_covariance(const Calibration& c, const Cloc
   Eigen::Matrix<double, kParameterCount, kGlobalCount> J;
   J.setZero();
   for (int i = 0; i < kParameterCount; ++i) J(i, i) = 1;
-  const int k = index(Parameter::kRadialDistortion);
-  const int f = index(Parameter::kFocalLength);
   const int l = index(Parameter::kLineDelay);
   const int d = index(Parameter::kClockOffset);
-  J(f, f) = c.camera.focal_length;
+  const ZoomQuantityMatrix<double> by_quantities = by_zoom_quantities(c.camera);
+  for (int i = 0; i < kZoomQuantityCount; ++i) {
+    for (int j = 0; j < kZoomQuantityCount; ++j) {
+      J(index(kParameterOfQuantity[static_cast<std::size_t>(i)]),
+        index(kParameterOfQuantity[static_cast<std::size_t>(j)])) = by_quantities(i, j);
+    }
+  }
   J(index(Parameter::kAspect), index(Parameter::kAspect)) = c.camera.aspect;
-  J(k, k) = c.camera.distortion_of_corner();
-  J(k, f) = 2 * c.camera.radial_distortion;
   if (!shares.line_delay_known) {
     J(l, l) = (1 + shares.image_rate) / c.camera.height;
     J(l, kDrift) = -shares.image * state.line_delay();

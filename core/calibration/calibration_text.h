@@ -15,7 +15,7 @@
 
 #include "core/calibration/calibration_types.h"
 #include "core/model/calibration.h"
-#include "core/model/zoom_curve.h"
+#include "core/model/lens/zoom_curve.h"
 
 namespace alidade {
 

@@ -11,7 +11,7 @@
 
 namespace alidade::internal {
 
-using CameraRows = Eigen::Matrix<double, kCameraCount, 2>;
+using CameraRows = Eigen::Matrix<double, kObservedCount, 2>;
 
 // A landmark's columns of Y, and its y (gradient). Control points as in Linearisation::touched.
 struct EliminatedLandmark {

@@ -8,7 +8,7 @@ namespace alidade::internal {
 
 namespace {
 
-using CameraJacobian = Eigen::Matrix<double, 2, kCameraCount>;
+using CameraJacobian = Eigen::Matrix<double, 2, kObservedCount>;
 
 // Image motion per row read out, in rows. Beyond this a landmark meets the read-out in no definite
 // row.
@@ -18,7 +18,7 @@ struct ObservationModel {
   const Camera<double> camera;
   const Mechanics<double>& mechanics;
   const double line_delay;
-  const double distortion_unit;  // k = distortion * unit
+  const CornerDistortion<double> distortion_unit;
   Matrix3<double> R_base_from_anchor;
   Matrix<double, 3, 4> J_xi_axes_anchor;
 
@@ -26,7 +26,7 @@ struct ObservationModel {
       : camera(state.physical_camera()),
         mechanics(state.mechanics),
         line_delay(state.line_delay()),
-        distortion_unit(state.camera.distortion_of_corner()) {
+        distortion_unit(corner_unit(state.camera)) {
     J_xi_axes_anchor.setZero();
     R_base_from_anchor =
         R_base_from_camera(state.mechanics, state.anchor, nullptr, &J_xi_axes_anchor);
@@ -75,11 +75,13 @@ struct ObservationModel {
     const Matrix<double, 2, 3> J_u_db = J_u_dc * R.transpose();
     out->J_landmark = whiten * (J_u_db * landmark.J_db_landmark);
     CameraJacobian J;
-    J.col(0) =
-        camera.focal_length * J_u_camera.col(0) + 2 * camera.radial_distortion * J_u_camera.col(2);
-    J.col(1) = camera.aspect * J_u_camera.col(1);
-    J.col(2) = distortion_unit * J_u_camera.col(2);
-    J.middleCols<2>(index(Parameter::kCentreU)) = J_u_camera.rightCols<2>();
+    J.col(camera_column::kFocalLength) = by_zoom(camera, J_u_camera);
+    J.col(camera_column::kAspect) = camera.aspect * J_u_camera.col(camera_column::kAspect);
+    for (int i = 0; i < kDistortionCount; ++i) {
+      const int column = camera_column::kDistortion + i;
+      J.col(column) = distortion_unit[i] * J_u_camera.col(column);
+    }
+    J.middleCols<2>(camera_column::kCentreU) = J_u_camera.middleCols<2>(camera_column::kCentreU);
     J.col(index(Parameter::kLineDelay)) = J_u_time * (observation.u.y() / camera.height);
     J.rightCols<4>() = J_u_xi * J_xi_axes + J_u_db * landmark.J_db_axes;
     out->J_camera = whiten * J;
@@ -116,7 +118,7 @@ void add_control_points(const TrajectorySpline::Basis& basis, const Matrix2<doub
 
 Camera<double> AdjustmentState::physical_camera() const {
   Camera<double> physical = camera;
-  physical.radial_distortion = distortion * camera.distortion_of_corner();
+  set_corner_distortion(corner_distortion, &physical);
   return physical;
 }
 
@@ -129,7 +131,7 @@ void apply_step(const Eigen::VectorXd& x, const std::vector<Vector2<double>>& x_
   const GlobalVector global = x.tail<kGlobalCount>();
   state->camera.focal_length *= std::exp(global[index(Parameter::kFocalLength)]);
   state->camera.aspect *= std::exp(global[index(Parameter::kAspect)]);
-  state->distortion += global[index(Parameter::kRadialDistortion)];
+  state->corner_distortion += global.segment<kDistortionCount>(camera_column::kDistortion);
   state->camera.centre_u += global[index(Parameter::kCentreU)];
   state->camera.centre_v += global[index(Parameter::kCentreV)];
   state->readout_s += global[index(Parameter::kLineDelay)];
@@ -171,7 +173,7 @@ void Lineariser::add_observations(const AdjustmentState& state, const LossScales
   out->observations.resize(data_.observations.size());
   out->H_landmark.assign(landmarks, Matrix2<double>::Zero());
   out->g_landmark.assign(landmarks, Vector2<double>::Zero());
-  out->H_camera.assign(landmarks, Eigen::Matrix<double, kCameraCount, 2>::Zero());
+  out->H_camera.assign(landmarks, Eigen::Matrix<double, kObservedCount, 2>::Zero());
   out->touched.clear();
   out->H_touched.clear();
   out->touched_begin.assign(1, 0);
@@ -179,9 +181,9 @@ void Lineariser::add_observations(const AdjustmentState& state, const LossScales
                          Matrix2<double>::Zero());
   is_touched_.assign(static_cast<std::size_t>(trajectory.control_points()), false);
 
-  Eigen::Matrix<double, kCameraCount, kCameraCount> H_cc;
+  Eigen::Matrix<double, kObservedCount, kObservedCount> H_cc;
   H_cc.setZero();
-  Eigen::Matrix<double, kCameraCount, 1> g_c;
+  Eigen::Matrix<double, kObservedCount, 1> g_c;
   g_c.setZero();
   std::vector<int> touched_now;
   std::size_t next = 0;
@@ -216,20 +218,21 @@ void Lineariser::add_observations(const AdjustmentState& state, const LossScales
       const Matrix2<double> Jt_landmark = robust.weight * result.J_landmark.transpose();
       const Vector2<double> g_angle = Jt_angle * result.error;
       add_control_points(basis, Jt_angle * result.J_angle, &out->H);
-      const Eigen::Matrix<double, kCameraCount, 2> H_ca = (Jt_angle * result.J_camera).transpose();
+      const Eigen::Matrix<double, kObservedCount, 2> H_ca =
+          (Jt_angle * result.J_camera).transpose();
       const Matrix2<double> H_al = Jt_angle * result.J_landmark;
       for (int i = 0; i < 4; ++i) {
         const int point = segment + i;
         const double w = basis.weight[i];
         out->g.segment<2>(2 * point) += w * g_angle;
-        out->H.border().block<kCameraCount, 2>(0, 2 * point) += w * H_ca;
+        out->H.border().block<kObservedCount, 2>(0, 2 * point) += w * H_ca;
         touched_buffer_[static_cast<std::size_t>(point)] += w * H_al;
         if (!is_touched_[static_cast<std::size_t>(point)]) {
           is_touched_[static_cast<std::size_t>(point)] = true;
           touched_now.push_back(point);
         }
       }
-      const Eigen::Matrix<double, kCameraCount, 2> Jt_camera =
+      const Eigen::Matrix<double, kObservedCount, 2> Jt_camera =
           robust.weight * result.J_camera.transpose();
       H_cc.noalias() += Jt_camera * result.J_camera;
       g_c.noalias() += Jt_camera * result.error;
@@ -247,15 +250,15 @@ void Lineariser::add_observations(const AdjustmentState& state, const LossScales
     touched_now.clear();
     out->touched_begin.push_back(out->touched.size());
   }
-  out->H.border().block<kCameraCount, kCameraCount>(0, camera_row) += H_cc;
-  out->g.segment<kCameraCount>(camera_row) += g_c;
+  out->H.border().block<kObservedCount, kObservedCount>(0, camera_row) += H_cc;
+  out->g.segment<kObservedCount>(camera_row) += g_c;
 }
 
 std::vector<Influence> Lineariser::influences(const AdjustmentState& state, const Linearisation& at,
                                               const GlobalRows& inverse) const {
   const ObservationModel model(state);
-  const Eigen::Matrix<double, kGlobalCount, kCameraCount> of_camera =
-      inverse.middleCols<kCameraCount>(inverse.cols() - kGlobalCount);
+  const Eigen::Matrix<double, kGlobalCount, kObservedCount> of_camera =
+      inverse.middleCols<kObservedCount>(inverse.cols() - kGlobalCount);
   std::vector<Influence> all(data_.observations.size(), Influence::Zero());
   for (std::size_t i = 0; i < all.size();) {
     const int name = data_.observations[i].landmark;
@@ -329,11 +332,11 @@ void Lineariser::add_telemetry(const AdjustmentState& state, const LossScales& l
     for (int k = 0; k < 4; ++k) {
       const int point = basis.segment + k;
       out->g.segment<2>(2 * point) += basis.weight[k] * robust.weight * slope.cwiseProduct(error);
-      H.border().block<4, 2>(kCameraCount, 2 * point) += basis.weight[k] * H_pa;
+      H.border().block<4, 2>(kObservedCount, 2 * point) += basis.weight[k] * H_pa;
     }
-    H.border().block<4, 4>(kCameraCount, global_row + kCameraCount) +=
+    H.border().block<4, 4>(kObservedCount, global_row + kObservedCount) +=
         robust.weight * J.transpose() * J;
-    out->g.segment<4>(global_row + kCameraCount) += robust.weight * J.transpose() * error;
+    out->g.segment<4>(global_row + kObservedCount) += robust.weight * J.transpose() * error;
   }
   out->H += H;
 }
@@ -346,13 +349,17 @@ void Lineariser::add_priors(const AdjustmentState& state, Linearisation* out) co
   error[index(Parameter::kFocalLength)] =
       std::log(mean.camera.focal_length / state.camera.focal_length);
   error[index(Parameter::kAspect)] = std::log(mean.camera.aspect / state.camera.aspect);
-  // The prior is of k itself, not of its scaled form.
-  const double f_ratio = state.camera.focal_length / mean.camera.focal_length;
-  error[index(Parameter::kRadialDistortion)] =
-      mean.distortion - state.distortion * f_ratio * f_ratio;
-  J(index(Parameter::kRadialDistortion), index(Parameter::kRadialDistortion)) = f_ratio * f_ratio;
-  J(index(Parameter::kRadialDistortion), index(Parameter::kFocalLength)) =
-      2 * state.distortion * f_ratio * f_ratio;
+  // The prior is of the terms themselves, in units of the corner at the prior's focal length.
+  const CornerDistortion<double> unit = corner_unit(mean.camera);
+  const CameraColumn<double> along = by_zoom(state.physical_camera());
+  const CornerDistortion<double> of_state =
+      distortion_by_factor(state.camera.focal_length / mean.camera.focal_length);
+  for (int i = 0; i < kDistortionCount; ++i) {
+    const int k = camera_column::kDistortion + i;
+    error[k] = mean.corner_distortion[i] - state.corner_distortion[i] * of_state[i];
+    J(k, k) = of_state[i];
+    J(k, camera_column::kFocalLength) = along[k] / unit[i];
+  }
   error.segment<2>(index(Parameter::kCentreU)) =
       mean.camera.centre_offset() - state.camera.centre_offset();
   error[index(Parameter::kLineDelay)] = mean.readout_s - state.readout_s;
@@ -386,7 +393,7 @@ void Lineariser::fix_parameters(Linearisation* out) const {
     leave_out(&out->H_telemetry);
     out->H.border()(i, first + i) = 1;
     out->g[first + i] = 0;
-    if (i >= kCameraCount) continue;
+    if (i >= kObservedCount) continue;
     for (auto& H_camera : out->H_camera) H_camera.row(i).setZero();
   }
 }

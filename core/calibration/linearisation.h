@@ -17,17 +17,17 @@
 #include "core/calibration/bordered_band.h"
 #include "core/calibration/trajectory_spline.h"
 #include "core/model/calibration.h"
+#include "core/model/lens/zoom_law.h"
 
 namespace alidade::internal {
 
 // Local parameters: those of Parameter, then the drift between the two clocks. They are scaled so
-// that every lens is equally easy: log f, log alpha, k (R / f)^2 (R: half the image's diagonal,
-// px), centre offset (px), read-out time l h. Changes of axes and landmarks are local
-// (direction.h).
+// that every lens is equally easy: log f, log alpha, distortion in the corner (zoom_law.h), centre
+// offset (px), read-out time l h. Changes of axes and landmarks are local (direction.h).
 inline constexpr int kDrift = kParameterCount;
 inline constexpr int kGlobalCount = kParameterCount + 1;
-// The first kCameraCount parameters act on observations.
-inline constexpr int kCameraCount = 10;
+// The parameters before the scales act on observations: camera, line delay, axes.
+inline constexpr int kObservedCount = index(Parameter::kPanScale);
 
 using GlobalVector = Eigen::Matrix<double, kGlobalCount, 1>;
 using GlobalMatrix = Eigen::Matrix<double, kGlobalCount, kGlobalCount>;
@@ -57,9 +57,9 @@ struct AdjustmentData {
 };
 
 struct AdjustmentState {
-  Camera<double> camera;  // radial_distortion is unused, see distortion
-  double distortion = 0;  // k (R / f)^2
-  double readout_s = 0;   // line delay times height
+  Camera<double> camera;  // its distortion is unused, see corner_distortion
+  CornerDistortion<double> corner_distortion = CornerDistortion<double>::Zero();
+  double readout_s = 0;  // line delay times height
   Mechanics<double> mechanics;
   double shift_s = 0;
   double drift = 0;
@@ -114,7 +114,7 @@ struct Linearisation {
   std::vector<std::size_t> touched_begin;  // into the two below; one more than landmarks
   std::vector<int> touched;
   std::vector<Matrix2<double>> H_touched;
-  std::vector<Eigen::Matrix<double, kCameraCount, 2>> H_camera;
+  std::vector<Eigen::Matrix<double, kObservedCount, 2>> H_camera;
 };
 
 // The parameters' rows of H^-1, with landmarks eliminated; as many columns as H.

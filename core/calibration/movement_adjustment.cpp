@@ -54,7 +54,7 @@ MovementAdjustment::MovementAdjustment(MovementData data, const ZoomCurve& curve
   }
   log_f_unknowns_ += 2;
   set_places();
-  unknowns_ = first_beside() + 3 * kPlaces;
+  unknowns_ = first_beside() + kBeside * kPlaces;
   set_start();
   set_landmarks();
 }
@@ -69,7 +69,9 @@ void MovementAdjustment::apply(const Eigen::VectorXd& x,
     spline_.control_point(i) +=
         Vector3<double>(x[point_row(i)], x[point_row(i) + 1], x[log_f_unknown(i)]);
   }
-  for (int i = 0; i < 3 * kPlaces; ++i) beside_(i % 3, i / 3) += x[first_beside() + i];
+  for (int i = 0; i < kBeside * kPlaces; ++i) {
+    beside_(i % kBeside, i / kBeside) += x[first_beside() + i];
+  }
   for (std::size_t l = 0; l < landmarks_.size(); ++l) {
     landmarks_[l] = direction_plus<double>(landmarks_[l], x_landmark[l]).normalized();
   }
@@ -87,7 +89,7 @@ void MovementAdjustment::minimise(double loss_px, int max_steps, Normal* at) {
       continue;
     }
     const ZoomMotionSpline spline = spline_;
-    const Eigen::Matrix3Xd beside = beside_;
+    const BesideColumns beside = beside_;
     const std::vector<Vector3<double>> landmarks = landmarks_;
     apply(x, x_landmark);
     Normal next;

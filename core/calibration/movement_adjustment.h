@@ -15,7 +15,7 @@
 #include "core/calibration/linearisation.h"
 #include "core/calibration/zoom_stretches.h"
 #include "core/model/cubic_spline.h"
-#include "core/model/zoom_curve.h"
+#include "core/model/lens/zoom_curve.h"
 
 namespace alidade::internal {
 
@@ -66,9 +66,13 @@ class MovementAdjustment {
   [[nodiscard]] double pixel_sigma_ratio() const { return pixel_sigma_ratio_; }
 
  private:
+  // What n counts: distortion in the corner and centre, the quantities behind log f.
+  static constexpr int kBeside = kZoomQuantityCount - index(ZoomQuantity::kCornerDistortion);
+  using Beside = Matrix<double, kBeside, 1>;
+  using BesideColumns = Matrix<double, kBeside, Eigen::Dynamic>;
   // Distortion and centre at a time. n is interpolated between two neighbouring places.
   struct LensPlace {
-    Vector3<double> quantities;  // corner distortion, centre
+    Beside quantities;
     int first = 0;
     double share = 0;  // of the second
   };
@@ -106,8 +110,6 @@ class MovementAdjustment {
   [[nodiscard]] Passing passing_at(double time_s) const;
   [[nodiscard]] LensPlace lens_at(double time_s) const;
   [[nodiscard]] Camera<double> camera_at(double log_f, const LensPlace& lens) const;
-  // k per unit of corner distortion.
-  [[nodiscard]] double per_corner_at(double focal_length) const;
   // Index of the first log f and of the first n among the unknowns.
   [[nodiscard]] int first_log_f() const { return 2 * spline_.control_points(); }
   [[nodiscard]] int first_beside() const { return first_log_f() + log_f_unknowns_; }
@@ -135,9 +137,9 @@ class MovementAdjustment {
   // and centre.
   std::vector<double> way_time_s_;
   std::vector<double> way_share_;
-  std::vector<Vector3<double>> way_quantities_;
-  Eigen::Matrix3Xd beside_;        // n
-  Eigen::Matrix3Xd beside_sigma_;  // sigma of n
+  std::vector<Beside> way_quantities_;
+  BesideColumns beside_;        // n
+  BesideColumns beside_sigma_;  // sigma of n
   std::vector<Vector3<double>> landmarks_;
   double telemetry_sigma_ = 0;
   int unknowns_ = 0;

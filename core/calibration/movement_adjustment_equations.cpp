@@ -14,10 +14,6 @@ namespace {
 constexpr double kLogFSigma = 0.5;  // where no frame sees log f, it stays near the start
 constexpr double kLostPixelSquare = 1e6;
 
-double half_diagonal_of(const MovementData& data) {
-  return 0.5 * std::hypot(data.width, data.height);
-}
-
 Matrix2<double> damped(Matrix2<double> H, double damping) {
   H.diagonal() *= 1 + damping;
   return H;
@@ -38,15 +34,11 @@ MovementAdjustment::Passing MovementAdjustment::passing_at(double time_s) const 
   return {i, (time_s - way_time_s_[i - 1]) / (way_time_s_[i] - way_time_s_[i - 1])};
 }
 
-double MovementAdjustment::per_corner_at(double focal_length) const {
-  return std::pow(focal_length / half_diagonal_of(data_), 2);
-}
-
 Camera<double> MovementAdjustment::camera_at(double log_f, const LensPlace& lens) const {
   Camera<double> camera = shared_.camera;
-  camera.focal_length = std::exp(log_f);
-  camera.radial_distortion = lens.quantities[0] * per_corner_at(camera.focal_length);
-  camera.set_centre_offset(lens.quantities.tail<2>());
+  ZoomQuantities<double> quantities;
+  quantities << log_f, lens.quantities;
+  set_zoom_quantities(quantities, &camera);
   return camera;
 }
 
@@ -80,8 +72,7 @@ bool MovementAdjustment::observe(const AdjustmentObservation& seen, Row* row) co
   Matrix<double, 2, kCameraParameterCount> J_u_camera;
   if (project(camera, d_c, &u, &J_u_dc, &J_u_camera) != ProjectionStatus::kOk) return false;
   const Matrix2<double> J_u_angle = J_u_dc * skew(d_c) * J_xi_angle;
-  const Vector2<double> J_u_log_f =
-      camera.focal_length * J_u_camera.col(0) + 2 * camera.radial_distortion * J_u_camera.col(2);
+  const Vector2<double> J_u_log_f = by_zoom(camera, J_u_camera);
   const Vector2<double> J_u_row =
       (J_u_angle * rate.head<2>() + J_u_log_f * rate[2]) * shared_.line_delay;
   constexpr double kMaxSlope = 0.9;
@@ -105,13 +96,15 @@ bool MovementAdjustment::observe(const AdjustmentObservation& seen, Row* row) co
     add(point_row(point) + 1, weight * J_angle.col(1));
     add(log_f_unknown(point), weight * J_log_f);
   }
-  const double per_corner = per_corner_at(camera.focal_length);
+  const CornerDistortion<double> unit = corner_unit(camera);
   for (const int which : {0, 1}) {
     const double share = which == 0 ? 1 - lens.share : lens.share;
-    const int first = first_beside() + 3 * (lens.first + which);
-    add(first, share * per_corner * (whiten * J_u_camera.col(2)));
-    add(first + 1, share * whiten.col(0));
-    add(first + 2, share * whiten.col(1));
+    const int first = first_beside() + kBeside * (lens.first + which);
+    for (int i = 0; i < kDistortionCount; ++i) {
+      add(first + i, share * unit[i] * (whiten * J_u_camera.col(camera_column::kDistortion + i)));
+    }
+    add(first + kDistortionCount, share * whiten.col(0));
+    add(first + kDistortionCount + 1, share * whiten.col(1));
   }
   row->J_landmark = whiten * J_u_dc * R.transpose() * tangent_basis(d_b);
   return true;
@@ -199,9 +192,9 @@ void MovementAdjustment::linearise(double loss_px, bool with_derivatives, Normal
       }
     }
   }
-  for (int i = 0; i < 3 * kPlaces; ++i) {
-    const double sigma = beside_sigma_(i % 3, i / 3);
-    const double n = beside_(i % 3, i / 3);
+  for (int i = 0; i < kBeside * kPlaces; ++i) {
+    const double sigma = beside_sigma_(i % kBeside, i / kBeside);
+    const double n = beside_(i % kBeside, i / kBeside);
     out->cost += n * n / (sigma * sigma);
     if (!with_derivatives) continue;
     const int a = first_beside() + i;

@@ -10,16 +10,18 @@
 namespace alidade::internal {
 
 void MovementAdjustment::set_places() {
-  const auto quantities = [&](double reading, Vector3<double>* sigma) {
+  const auto quantities = [&](double reading, Beside* sigma) -> Beside {
     Calibration c;
-    if (!curve_.at(reading, &c)) return Vector3<double>(0, 0, 0);
-    const double per_corner = per_corner_at(c.camera.focal_length);
+    if (!curve_.at(reading, &c)) return Beside::Zero();
     if (sigma != nullptr) {
-      *sigma = {parameter_sigma(c, Parameter::kRadialDistortion) / per_corner,
-                parameter_sigma(c, Parameter::kCentreU), parameter_sigma(c, Parameter::kCentreV)};
+      const CornerDistortion<double> unit = corner_unit(c.camera);
+      for (int i = 0; i < kDistortionCount; ++i) {
+        (*sigma)[i] = parameter_sigma(c, distortion_parameter(i)) / unit[i];
+      }
+      sigma->tail<2>() << parameter_sigma(c, Parameter::kCentreU),
+          parameter_sigma(c, Parameter::kCentreV);
     }
-    return Vector3<double>(c.camera.radial_distortion / per_corner, c.camera.centre_u,
-                           c.camera.centre_v);
+    return zoom_quantities(c.camera).tail<kBeside>();
   };
   const double from = data_.passed.front().zoom;
   const double to = data_.passed.back().zoom;
@@ -28,12 +30,13 @@ void MovementAdjustment::set_places() {
     way_share_.push_back((reading.zoom - from) / (to - from));
     way_quantities_.push_back(quantities(reading.zoom, nullptr));
   }
-  beside_ = Eigen::Matrix3Xd::Zero(3, kPlaces);
-  beside_sigma_ = Eigen::Matrix3Xd::Zero(3, kPlaces);
+  beside_ = BesideColumns::Zero(kBeside, kPlaces);
+  beside_sigma_ = BesideColumns::Zero(kBeside, kPlaces);
   // What the curve takes as exact gets a small sigma, so that the normal equations stay regular.
-  const Vector3<double> least(1e-6, 1e-4, 1e-4);
+  Beside least;
+  least << CornerDistortion<double>::Constant(1e-6), 1e-4, 1e-4;
   for (int i = 0; i < kPlaces; ++i) {
-    Vector3<double> sigma = Vector3<double>::Zero();
+    Beside sigma = Beside::Zero();
     (void)quantities(from + (to - from) * i / (kPlaces - 1), &sigma);
     beside_sigma_.col(i) = sigma.cwiseMax(least);
   }

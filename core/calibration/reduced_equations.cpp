@@ -18,12 +18,12 @@ bool ReducedEquations::set(const Linearisation& in, double damping) {
   const bool regular = eliminate_landmarks(in, damping, [&](const EliminatedLandmark& Y) {
     const int* row = &in.touched[in.touched_begin[Y.landmark]];
     for (const Matrix2<double>& Y_i : Y.points) {
-      border_.block<kCameraCount, 2>(0, 2 * *row) -= Y.camera * Y_i.transpose();
+      border_.block<kObservedCount, 2>(0, 2 * *row) -= Y.camera * Y_i.transpose();
       g_.segment<2>(2 * *row) -= Y_i * Y.gradient;
       ++row;
     }
-    corner_.topLeftCorner<kCameraCount, kCameraCount>() -= Y.camera * Y.camera.transpose();
-    g_.segment<kCameraCount>(points) -= Y.camera * Y.gradient;
+    corner_.topLeftCorner<kObservedCount, kObservedCount>() -= Y.camera * Y.camera.transpose();
+    g_.segment<kObservedCount>(points) -= Y.camera * Y.gradient;
     Y_points_.insert(Y_points_.end(), Y.points.begin(), Y.points.end());
     Y_camera_[Y.landmark] = Y.camera;
   });
@@ -57,8 +57,9 @@ Eigen::VectorXd ReducedEquations::times(const Eigen::VectorXd& x) const {
     product[j] += h * x[i];
   });
   const Eigen::Index points = border_.cols();
-  const Eigen::Matrix<double, kCameraCount, 1> x_camera = x.segment<kCameraCount>(points);
-  Eigen::Matrix<double, kCameraCount, 1> of_camera = Eigen::Matrix<double, kCameraCount, 1>::Zero();
+  const Eigen::Matrix<double, kObservedCount, 1> x_camera = x.segment<kObservedCount>(points);
+  Eigen::Matrix<double, kObservedCount, 1> of_camera =
+      Eigen::Matrix<double, kObservedCount, 1>::Zero();
   for (std::size_t l = 0; l < Y_camera_.size(); ++l) {
     const std::size_t begin = in_->touched_begin[l];
     const std::size_t end = in_->touched_begin[l + 1];
@@ -69,7 +70,7 @@ Eigen::VectorXd ReducedEquations::times(const Eigen::VectorXd& x) const {
       product.segment<2>(2 * in_->touched[i]) -= Y_points_[i] * sum;
     of_camera += Y_camera_[l] * sum;
   }
-  product.segment<kCameraCount>(points) -= of_camera;
+  product.segment<kObservedCount>(points) -= of_camera;
   return product;
 }
 

@@ -135,11 +135,11 @@ StageStatus start_values(const CalibrationInput& input, const CalibrationOptions
   start->prior = prior_knowledge(input.width, input.height, options, clocks, match.focal_length);
   const AdjustmentState& mean = start->prior.priors.mean;
   AdjustmentState& state = start->state;
-  state.camera = {match.focal_length, mean.camera.aspect, 0, input.width, input.height};
+  state.camera = {match.focal_length, mean.camera.aspect, {0}, input.width, input.height};
   if (options.focal_length && options.focal_length->sigma == 0) {
     state.camera.focal_length = mean.camera.focal_length;
   }
-  state.distortion = mean.distortion;
+  state.corner_distortion = mean.corner_distortion;
   state.readout_s = mean.readout_s;
   state.mechanics = mean.mechanics;
   state.shift_s = match.shift_s;

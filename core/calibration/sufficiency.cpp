@@ -262,9 +262,8 @@ void judge(const CalibrationOptions& options, const MotionExtent& motion,
         text("read-out known to %.1f ms only: move faster while the image is read out",
              1e3 * readout_error));
   }
-  const double corner = 0.5 * std::hypot(c.camera.width, c.camera.height) / c.camera.focal_length;
   const double distortion_error =
-      parameter_sigma(c, Parameter::kRadialDistortion) * corner * corner;
+      parameter_sigma(c, Parameter::kRadialDistortion) / corner_unit(c.camera)[0];
   if (distortion_error > kMaxDistortionError) {
     reasons.push_back(
         text("radial distortion known to %.1f %% of the radius only: let landmarks cross the whole "

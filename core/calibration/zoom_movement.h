@@ -14,7 +14,7 @@
 
 #include "core/calibration/calibration_types.h"
 #include "core/calibration/zoom_stretches.h"
-#include "core/model/zoom_curve.h"
+#include "core/model/lens/zoom_curve.h"
 
 namespace alidade {
 

@@ -12,11 +12,8 @@ namespace {
 
 // The calibration parameter at an index of a sample.
 Parameter zoom_parameter_at(int i) {
-  constexpr std::array<Parameter, kZoomQuantityCount> kLens = {
-      Parameter::kFocalLength, Parameter::kRadialDistortion, Parameter::kCentreU,
-      Parameter::kCentreV};
   return i < kZoomQuantityCount
-             ? kLens[static_cast<std::size_t>(i)]
+             ? kParameterOfQuantity[static_cast<std::size_t>(i)]
              : kSharedParameters[static_cast<std::size_t>(i - kZoomQuantityCount)];
 }
 
@@ -31,18 +28,14 @@ int zoom_place_of(Parameter parameter) {
 ZoomSample make_zoom_sample(const Calibration& c, const Calibration& reference) {
   ZoomSample sample;
   sample.reading = *c.zoom;
-  const double per_corner = c.camera.distortion_of_corner();
-  sample.value.head<kZoomQuantityCount>() << std::log(c.camera.focal_length),
-      c.camera.radial_distortion / per_corner, c.camera.centre_u, c.camera.centre_v;
+  sample.value.head<kZoomQuantityCount>() = zoom_quantities(c.camera);
   for (const Parameter p : {Parameter::kAspect, Parameter::kLineDelay, Parameter::kPanScale,
                             Parameter::kTiltScale, Parameter::kClockOffset}) {
     sample.value[zoom_place_of(p)] = parameter_value(c, p) - parameter_value(reference, p);
   }
 
   ZoomSampleMatrix J = ZoomSampleMatrix::Identity();
-  J(0, 0) = 1 / c.camera.focal_length;
-  J(1, 0) = -2 * c.camera.radial_distortion / (per_corner * c.camera.focal_length);
-  J(1, 1) = 1 / per_corner;
+  J.topLeftCorner<kZoomQuantityCount, kZoomQuantityCount>() = zoom_quantities_by_camera(c.camera);
   const auto set_axis = [&](Parameter first, const Vector3<double>& axis,
                             const Vector3<double>& of_reference) {
     const int place = zoom_place_of(first);

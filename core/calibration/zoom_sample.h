@@ -1,6 +1,6 @@
 #pragma once
 // One calibration at a zoom reading as a linear observation of log f, corner distortion and optical
-// centre at that reading, and of what all readings share (core/model/zoom_curve.h). Shared
+// centre at that reading, and of what all readings share (core/model/lens/zoom_curve.h). Shared
 // parameters are changes from a reference, axes in the reference's tangent basis.
 // Units of ZoomQuantity and Parameter. Pure; allocates.
 

@@ -1,5 +1,5 @@
 #pragma once
-// The zoom curve (core/model/zoom_curve.h) in a calibration.yaml. The file's other keys are the
+// The zoom curve (core/model/lens/zoom_curve.h) in a calibration.yaml. The file's other keys are the
 // calibration at its `zoom`.
 //   zoom_curve:
 //     repeatability: 0.002                        sigma of log f after a movement of the zoom
@@ -14,7 +14,7 @@
 #include <yaml-cpp/yaml.h>
 
 #include "core/calibration/estimate_reader.h"
-#include "core/model/zoom_curve.h"
+#include "core/model/lens/zoom_curve.h"
 
 namespace alidade::internal {
 

@@ -180,9 +180,10 @@ PersonStatus PersonDetector::find(const ImageView& image, const FrameOrientation
 PersonStatus PersonDetector::find_at_all_scales(const ImageView& image) {
   boxes_.clear();
   if (!image.valid() || image.stride < 0) return PersonStatus::kNoImage;
-  for (double height = options_.least_height_px; height <= options_.most_height_px;
-       height *= kScaleStep) {
+  double height = options_.least_height_px;
+  while (height <= options_.most_height_px) {
     hog_->look(image, 0, image.height, kPersonHeight_px / height, options_.threshold, &boxes_);
+    height *= kScaleStep;
   }
   drop_overlapped();
   return PersonStatus::kOk;

@@ -12,7 +12,7 @@
 #include <Eigen/LU>
 
 #include "core/ground/world_plane.h"
-#include "core/model/camera.h"
+#include "core/model/lens/camera.h"
 
 namespace alidade {
 

@@ -21,7 +21,7 @@ namespace alidade {
 struct PosedPicture {
   Matrix3<double> R_base_from_camera = Matrix3<double>::Identity();
   Camera<double> camera;
-  Matrix<double, kCameraParameterCount, 1> J_camera_log;  // d camera / d log f
+  CameraColumn<double> J_camera_log;  // d camera / d log f
   PictureMotion motion;
   Matrix4<double> cov_pose = Matrix4<double>::Zero();  // (xi, log f)
 };

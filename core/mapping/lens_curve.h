@@ -2,26 +2,24 @@
 // LensCurve: a lens over its range of focal lengths, with s = log f (px) by the zoom reading, from
 // a data sheet or an earlier calibration. x(s) = (delta, kappa, c_u, c_v) is a cubic B-spline.
 //   log f = s + delta(s) + eps                        eps: how the lens came to rest this time
-//   k = kappa (f / R)^2 exp(2 (hold - 1) eps)   R: half the image's diagonal, px
+//   kappa: distortion in the corner (core/model/lens/zoom_law.h) at log f = s + delta(s)
 //   c: optical centre from the image's middle, px
-// kappa is the distortion in the corner (core/model/zoom_curve.h). With eps, hold = 1 keeps kappa,
-// hold = 0 keeps k. Beyond the ends x is constant. Linear in the control points. The constructor
-// allocates.
+// With eps, hold = 1 keeps kappa, hold = 0 keeps the distortion's terms. Beyond the ends x is
+// constant. Linear in the control points. The constructor allocates.
 
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
-#include "core/model/camera.h"
 #include "core/model/cubic_spline.h"
-#include "core/model/rolling_shutter.h"
+#include "core/model/lens/camera.h"
+#include "core/model/lens/zoom_law.h"
 
 namespace alidade {
 
-// delta, kappa, c_u, c_v
-inline constexpr int kLensQuantityCount = 4;
-using LensQuantities = Matrix<double, kLensQuantityCount, 1>;
-using CameraColumn = Matrix<double, kCameraParameterCount, 1>;
+// x(s), in the order of ZoomQuantity, with delta in the place of log f.
+inline constexpr int kLensQuantityCount = kZoomQuantityCount;
+using LensQuantities = ZoomQuantities<double>;
 
 class LensCurve : public CubicSpline<kLensQuantityCount, LensCurve> {
  public:
@@ -36,9 +34,8 @@ class LensCurve : public CubicSpline<kLensQuantityCount, LensCurve> {
         width_(camera.width),
         height_(camera.height),
         aspect_(camera.aspect) {
-    const double to_corner = corner_px() / camera.focal_length;
-    const LensQuantities x(0, camera.radial_distortion * to_corner * to_corner, camera.centre_u,
-                           camera.centre_v);
+    LensQuantities x = zoom_quantities(camera);
+    x[0] = 0;
     for (int i = 0; i < control_points(); ++i) control_point(i) = x;
   }
 
@@ -63,12 +60,12 @@ class LensCurve : public CubicSpline<kLensQuantityCount, LensCurve> {
   // Weights at s, clamped to the curve's range.
   [[nodiscard]] Basis basis_at(double s) const { return basis(std::clamp(s, begin_s(), end_s())); }
 
-  // The camera for given quantities; uses only this lens's shape. J_*: d (f, alpha, k, c_u,
-  // c_v) / d x, / d eps, / d hold.
+  // The camera for given quantities; uses only this lens's shape. J_*: d camera / d x, / d eps,
+  // / d hold.
   struct Jacobians {
     Matrix<double, kCameraParameterCount, kLensQuantityCount> J_x;
-    CameraColumn J_eps;
-    CameraColumn J_hold;
+    CameraColumn<double> J_eps;
+    CameraColumn<double> J_hold;
   };
   [[nodiscard]] Camera<double> camera(double s, const LensQuantities& x, double eps, double hold,
                                       Jacobians* jacobians = nullptr) const {
@@ -77,28 +74,36 @@ class LensCurve : public CubicSpline<kLensQuantityCount, LensCurve> {
     out.aspect = aspect_;
     out.width = width_;
     out.height = height_;
-    const double k_by_kappa = out.distortion_of_corner() * std::exp(2 * (hold - 1) * eps);
-    out.radial_distortion = x[1] * k_by_kappa;
     out.set_centre_offset(x.tail<2>());
-    if (jacobians != nullptr) {
-      const double k = out.radial_distortion;
-      jacobians->J_x << out.focal_length, 0, 0, 0,  //
-          0, 0, 0, 0,                               //
-          2 * k, k_by_kappa, 0, 0,                  //
-          0, 0, 1, 0,                               //
-          0, 0, 0, 1;
-      jacobians->J_eps << out.focal_length, 0, 2 * hold * k, 0, 0;
-      jacobians->J_hold << 0, 0, 2 * eps * k, 0, 0;
+    CornerDistortion<double> unit = corner_unit(out);
+    // What hold < 1 takes back of the zoom by eps.
+    const CornerDistortion<double> kept = distortion_by_zoom((hold - 1) * eps);
+    for (int i = 0; i < kDistortionCount; ++i) {
+      unit[i] *= kept[i];
+      out.distortion[i] = x[index(ZoomQuantity::kCornerDistortion) + i] * unit[i];
     }
+    if (jacobians == nullptr) return out;
+    const CameraColumn<double> along = by_zoom(out);
+    jacobians->J_x.setZero();
+    jacobians->J_x.col(0) = along;
+    for (int i = 0; i < kDistortionCount; ++i) {
+      jacobians->J_x(camera_column::kDistortion + i, index(ZoomQuantity::kCornerDistortion) + i) =
+          unit[i];
+    }
+    jacobians->J_x.bottomRightCorner<2, 2>().setIdentity();
+    jacobians->J_eps = hold * along;
+    jacobians->J_eps[camera_column::kFocalLength] = out.focal_length;
+    jacobians->J_hold = eps * along;
+    jacobians->J_hold[camera_column::kFocalLength] = 0;
     return out;
   }
   [[nodiscard]] Camera<double> camera_at(double s, double eps = 0) const {
     return camera(s, value(basis_at(s)), eps, hold_);
   }
 
-  // The camera of a focal length, whatever its zoom reading. J_camera_log: d (f, alpha, k, c_u,
-  // c_v) / d log f.
-  [[nodiscard]] Camera<double> camera_of(double log_f, CameraColumn* J_camera_log = nullptr) const {
+  // The camera of a focal length, whatever its zoom reading. J_camera_log: d camera / d log f.
+  [[nodiscard]] Camera<double> camera_of(double log_f,
+                                         CameraColumn<double>* J_camera_log = nullptr) const {
     // Fixed-point iteration; converges as delta changes slowly.
     double s = log_f;
     for (int step = 0; step < 30; ++step) {
@@ -113,8 +118,13 @@ class LensCurve : public CubicSpline<kLensQuantityCount, LensCurve> {
       const bool inside = begin_s() < s && s < end_s();
       const LensQuantities slope = inside ? derivative(at) : LensQuantities(LensQuantities::Zero());
       const LensQuantities by_log = slope / (1 + slope[0]);
-      *J_camera_log << out.focal_length, 0,
-          2 * out.radial_distortion + by_log[1] * out.distortion_of_corner(), by_log[2], by_log[3];
+      const CornerDistortion<double> unit = corner_unit(out);
+      *J_camera_log = by_zoom(out);
+      for (int i = 0; i < kDistortionCount; ++i) {
+        (*J_camera_log)[camera_column::kDistortion + i] +=
+            by_log[index(ZoomQuantity::kCornerDistortion) + i] * unit[i];
+      }
+      J_camera_log->tail<2>() = by_log.tail<2>();
     }
     return out;
   }

@@ -80,7 +80,7 @@ class MapMaking {
                                           const Vector3<double>& d_b) const {
     const AdjustedPicture& pose = found_.pictures[at];
     MapProjection seen;
-    Matrix<double, kCameraParameterCount, 1> J_camera_log;
+    CameraColumn<double> J_camera_log;
     (void)found_.lens.camera_of(std::log(pose.camera.focal_length), &J_camera_log);
     if (project_from_map(pose.camera, picture(at).motion, pose.R_base_from_camera, u.y(), d_b,
                          &seen) != ProjectionStatus::kOk) {

@@ -2,12 +2,13 @@
 // Where one picture sees a direction of the map, for localization and adjustment. No allocation.
 //   u = project(camera at row v, M(v)^T R^T d),   R = R_base_from_camera at the reference row
 //   M(v) = Exp(w t), t = (v - reference row) * line delay;   log f at row v grows by zoom_rate t
-// The corner's distortion stays while f changes. w is the camera's turn rate in its own frame,
+// f changes as zoom_law.h has it. w is the camera's turn rate in its own frame,
 // constant over a picture (constant rates of the angles, as in rolling_shutter.h, differ in second
 // order). v is the measured row; its error moves t: see reprojection_error_covariance() there. A
 // picture shows only rates times line delay: in_heights() gives the motion per image height.
 
-#include "core/model/camera.h"
+#include "core/model/lens/camera.h"
+#include "core/model/lens/zoom_law.h"
 #include "core/model/rolling_shutter.h"
 #include "core/model/rotation.h"
 
@@ -61,7 +62,9 @@ struct MapProjection {
       J_u_turned * motion.angular_velocity + motion.zoom_rate * J_u_log_f;
   out->J_u_motion << time * J_u_turned, time * J_u_log_f;
   if (turns) out->J_u_motion.leftCols<3>() *= left_jacobian_so3(turn);
-  if (zooms) refer_to_reference_row(camera, at_row, &out->J_u_camera);
+  if (zooms) {
+    refer_to_unzoomed(at_row.focal_length / camera.focal_length, &out->J_u_camera);
+  }
   out->J_u_row = motion.line_delay * J_u_time;
   const Matrix<double, 2, 3> J_u_reference = J_u_row_frame * R_row_from_reference;
   out->J_u_xi = J_u_reference * skew(d_reference);

@@ -43,7 +43,7 @@ struct Residual {
 };
 
 bool residual_of(const PoseMatch& match, const PoseState& state, const Camera<double>& camera,
-                 const CameraColumn& J_camera_log, Residual* out) {
+                 const CameraColumn<double>& J_camera_log, Residual* out) {
   MapProjection seen;
   if (project_from_map(camera, state.motion, state.R, match.u.y(), match.d_b, &seen) !=
       ProjectionStatus::kOk) {
@@ -119,7 +119,7 @@ NormalEquations normal_equations(const std::vector<PoseMatch>& matches,
   NormalEquations out;
   out.N.setZero(count, count);
   out.b.setZero(count);
-  CameraColumn J_camera_log;
+  CameraColumn<double> J_camera_log;
   const Camera<double> camera = knowledge.lens.camera_of(state.log_f, &J_camera_log);
   Residual residual;
   for (const int i : inliers) {
@@ -244,7 +244,7 @@ bool adjust_pose(const std::vector<PoseMatch>& matches, const std::vector<int>& 
 // noise.
 double noise_of(const std::vector<PoseMatch>& matches, const std::vector<int>& inliers,
                 const PoseKnowledge& knowledge, const PoseState& state) {
-  CameraColumn J_camera_log;
+  CameraColumn<double> J_camera_log;
   const Camera<double> camera = knowledge.lens.camera_of(state.log_f, &J_camera_log);
   std::vector<double> squares;
   Residual residual;
@@ -263,7 +263,7 @@ double noise_of(const std::vector<PoseMatch>& matches, const std::vector<int>& i
 std::vector<int> within_gate(const std::vector<PoseMatch>& matches,
                              const std::vector<int>& candidates, const PoseKnowledge& knowledge,
                              const PoseState& state, double gate_sigmas) {
-  CameraColumn J_camera_log;
+  CameraColumn<double> J_camera_log;
   const Camera<double> camera = knowledge.lens.camera_of(state.log_f, &J_camera_log);
   std::vector<int> out;
   Residual residual;

@@ -8,18 +8,18 @@
 #include <cmath>
 #include <optional>
 
-#include "core/model/camera.h"
+#include "core/model/lens/camera.h"
 #include "core/model/linear_algebra.h"
 #include "core/model/mechanics.h"
 
 namespace alidade {
 
 enum class Parameter : int {
-  kFocalLength,
-  kAspect,
-  kRadialDistortion,
-  kCentreU,
-  kCentreV,
+  kFocalLength = camera_column::kFocalLength,
+  kAspect = camera_column::kAspect,
+  kRadialDistortion = camera_column::kDistortion,  // and the distortion's other terms
+  kCentreU = camera_column::kCentreU,
+  kCentreV = camera_column::kCentreV,
   kLineDelay,
   kPanAxis0,
   kPanAxis1,
@@ -35,6 +35,11 @@ inline constexpr int kParameterCount = static_cast<int>(Parameter::kCount);
 
 [[nodiscard]] constexpr int index(Parameter parameter) { return static_cast<int>(parameter); }
 
+// The parameter of a term of the distortion, 0 to kDistortionCount - 1.
+[[nodiscard]] constexpr Parameter distortion_parameter(int term) {
+  return static_cast<Parameter>(camera_column::kDistortion + term);
+}
+
 // The name in files and reports.
 [[nodiscard]] constexpr const char* to_string(Parameter parameter) {
   switch (parameter) {
@@ -43,7 +48,7 @@ inline constexpr int kParameterCount = static_cast<int>(Parameter::kCount);
     case Parameter::kAspect:
       return "aspect";
     case Parameter::kRadialDistortion:
-      return "radial_distortion";
+      return Distortion<double>::kNames[0];
     case Parameter::kCentreU:
       return "centre_u";
     case Parameter::kCentreV:
@@ -116,7 +121,7 @@ struct Calibration {
     case Parameter::kAspect:
       return calibration.camera.aspect;
     case Parameter::kRadialDistortion:
-      return calibration.camera.radial_distortion;
+      return calibration.camera.distortion.radial;
     case Parameter::kCentreU:
       return calibration.camera.centre_u;
     case Parameter::kCentreV:

@@ -14,15 +14,15 @@
 #include <cmath>
 
 #include "core/model/calibration.h"
-#include "core/model/camera.h"
+#include "core/model/lens/camera.h"
+#include "core/model/lens/zoom_law.h"
 #include "core/model/mechanics.h"
 
 namespace alidade {
 
 // The motion of mount and lens about one frame: TRUE angles (rad), rates (rad/s) and constant
 // accelerations (rad/s^2) when reference_row is exposed. zoom_rate is d log f / dt (1/s): log f(v)
-// = log f + zoom_rate t. The distortion in the corner is constant, k(v) = k (f(v) / f)^2. The
-// camera is that at reference_row.
+// = log f + zoom_rate t (zoom_law.h). The camera is that at reference_row.
 // PTCEE 26, 27 hold the body rate constant. Here the ANGLES move at constant rates or, if known, at
 // constant accelerations. A rate that grows by half a field of view per second within a second
 // bends a frame with a read-out of 30 ms by 0.1 px.
@@ -66,40 +66,12 @@ template <class S>
           motion.rate.tilt + motion.acceleration.tilt * time};
 }
 
-// The camera with log f increased by `change` and the same distortion in the corner.
-template <class S>
-[[nodiscard]] Camera<S> zoomed(const Camera<S>& camera, const NonDeduced<S>& change) {
-  using std::exp;
-  const S factor = exp(change);
-  Camera<S> out = camera;
-  out.focal_length *= factor;
-  out.radial_distortion *= factor * factor;
-  return out;
-}
-
 // The camera when `row` is exposed.
 template <class S>
 [[nodiscard]] Camera<S> camera_at_row(const Camera<S>& camera, const FrameMotion<S>& motion,
                                       const NonDeduced<S>& line_delay, const NonDeduced<S>& row) {
   if (motion.zoom_rate == S(0)) return camera;
   return zoomed(camera, motion.zoom_rate * time_of_row(motion, line_delay, row));
-}
-
-// d y / d log f at constant distortion in the corner, from y's Jacobian with respect to the camera.
-template <class S, int kRows>
-[[nodiscard]] Matrix<S, kRows, 1> by_zoom(const Camera<S>& camera,
-                                          const Matrix<S, kRows, kCameraParameterCount>& J_camera) {
-  return camera.focal_length * J_camera.col(0) + S(2) * camera.radial_distortion * J_camera.col(2);
-}
-
-// Converts a Jacobian with respect to the camera at a row to one with respect to the camera at the
-// reference row.
-template <class S, int kRows>
-void refer_to_reference_row(const Camera<S>& camera, const Camera<S>& at_row,
-                            Matrix<S, kRows, kCameraParameterCount>* J_camera) {
-  const S factor = at_row.focal_length / camera.focal_length;
-  J_camera->col(0) *= factor;
-  J_camera->col(2) *= factor * factor;
 }
 
 // d (pan, tilt, pan rate, tilt rate) / d Parameter of a motion from MEASURED angles, looked up at
@@ -153,7 +125,7 @@ template <class S>
   Vector3<S> J_d_time = J_d_xi * (J_xi_angle * rate_at_row(motion, line_delay, u.y()).vector());
   if (zooms) {
     J_d_time += motion.zoom_rate * (R * by_zoom(at_row, J_dc_camera));
-    refer_to_reference_row(camera, at_row, &J_dc_camera);
+    refer_to_unzoomed(at_row.focal_length / camera.focal_length, &J_dc_camera);
   }
   const S rows = u.y() - motion.reference_row;
   if (J_d_u != nullptr) {
@@ -205,7 +177,7 @@ template <class S>
   Vector2<S> J_u_time = J_u_angle * rate_at_row(motion, line_delay, row).vector();
   if (zooms) {
     J_u_time += motion.zoom_rate * by_zoom(at_row, J_u_camera);
-    refer_to_reference_row(camera, at_row, &J_u_camera);
+    refer_to_unzoomed(at_row.focal_length / camera.focal_length, &J_u_camera);
   }
   const S rows = row - motion.reference_row;
   if (J_u_row != nullptr) *J_u_row = J_u_time * line_delay;

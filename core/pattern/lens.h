@@ -1,15 +1,14 @@
 #pragma once
-// The lens of a camera that sees a known pattern: perspective with radial and tangential distortion
-// (OpenCV's k1 k2 p1 p2). Camera frame RDF.
-//   x = (p_1, p_2) / p_3,   r^2 = |x|^2,   s = 1 + k1 r^2 + k2 r^4
-//   x_d = s x + (2 p1 x_1 x_2 + p2 (r^2 + 2 x_1^2),  p1 (r^2 + 2 x_2^2) + 2 p2 x_1 x_2)
-//   u = (f_u x_d1 + c_u, f_v x_d2 + c_v)
+// The lens of a camera that sees a known pattern: perspective with the distortion of OpenCV. Camera
+// frame RDF.
+//   u = (f_u x_d1 + c_u, f_v x_d2 + c_v),   x_d = distortion(x), x = (p_1, p_2) / p_3
 // Pixels are continuous; the centre of the top-left pixel is at (0.5, 0.5), so c_u, c_v are
 // OpenCV's plus 0.5. Row v is exposed at t0 + v * line_delay. With f_u = f_v, a centre in the
-// middle and k2 = p1 = p2 = 0 it is the camera of core/model/camera.h.
+// middle and k2 = p1 = p2 = 0 it is the camera of core/model/lens/camera.h.
 
 #include <array>
 
+#include "core/model/lens/distortion.h"
 #include "core/model/linear_algebra.h"
 #include "core/model/projection_status.h"
 
@@ -20,7 +19,7 @@ enum class LensParameter {
   kFocalLengthV,  // px
   kCentreU,       // px
   kCentreV,       // px
-  kK1,
+  kK1,            // the distortion's terms, in their order
   kK2,
   kP1,
   kP2,
@@ -51,6 +50,11 @@ struct LensKnowledge {
   LensMatrix information = LensMatrix::Zero();  // inverse covariance; 0: nothing is known
 };
 
+[[nodiscard]] inline BrownDistortion<double> distortion_of(const LensVector& lens) {
+  return {lens[index(LensParameter::kK1)], lens[index(LensParameter::kK2)],
+          lens[index(LensParameter::kP1)], lens[index(LensParameter::kP2)]};
+}
+
 // p_c: m, or any unit. J_u_lens is 0 in the line delay's column. Outputs are written with kOk only.
 [[nodiscard]] inline ProjectionStatus project_lens(
     const LensVector& lens, const Vector3<double>& p_c, Vector2<double>* u,
@@ -60,36 +64,29 @@ struct LensKnowledge {
   if (p_c.z() <= 0) return ProjectionStatus::kBehindCamera;
   const double f_u = lens[index(LensParameter::kFocalLengthU)];
   const double f_v = lens[index(LensParameter::kFocalLengthV)];
-  const double k1 = lens[index(LensParameter::kK1)];
-  const double k2 = lens[index(LensParameter::kK2)];
-  const double p1 = lens[index(LensParameter::kP1)];
-  const double p2 = lens[index(LensParameter::kP2)];
-  const double x = p_c.x() / p_c.z();
-  const double y = p_c.y() / p_c.z();
-  const double r2 = x * x + y * y;
-  // Beyond this the radial term turns back, and two directions share a pixel.
-  if (1 + r2 * (3 * k1 + 5 * k2 * r2) <= 0) return ProjectionStatus::kBeyondDistortionLimit;
-  const double s = 1 + r2 * (k1 + k2 * r2);
-  const double x_d = s * x + 2 * p1 * x * y + p2 * (r2 + 2 * x * x);
-  const double y_d = s * y + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y;
-  const Vector2<double> pixel(f_u * x_d + lens[index(LensParameter::kCentreU)],
-                              f_v * y_d + lens[index(LensParameter::kCentreV)]);
+  const BrownDistortion<double> distortion = distortion_of(lens);
+  const Vector2<double> x(p_c.x() / p_c.z(), p_c.y() / p_c.z());
+  Vector2<double> x_d;
+  Matrix2<double> J_u_x;
+  if (!distortion.distort(x, &x_d, J_u_p != nullptr ? &J_u_x : nullptr)) {
+    return ProjectionStatus::kBeyondDistortionLimit;
+  }
+  const Vector2<double> pixel(f_u * x_d.x() + lens[index(LensParameter::kCentreU)],
+                              f_v * x_d.y() + lens[index(LensParameter::kCentreV)]);
   if (!all_finite(pixel)) return ProjectionStatus::kNotFinite;
   *u = pixel;
   if (J_u_p != nullptr) {
-    const double s_r2 = k1 + 2 * k2 * r2;  // d s / d r^2
-    Matrix2<double> J_xd_x;
-    J_xd_x << s + 2 * s_r2 * x * x + 2 * p1 * y + 6 * p2 * x,
-        2 * s_r2 * x * y + 2 * p1 * x + 2 * p2 * y, 2 * s_r2 * x * y + 2 * p1 * x + 2 * p2 * y,
-        s + 2 * s_r2 * y * y + 6 * p1 * y + 2 * p2 * x;
-    J_xd_x.row(0) *= f_u / p_c.z();
-    J_xd_x.row(1) *= f_v / p_c.z();
-    *J_u_p << J_xd_x, -J_xd_x * Vector2<double>(x, y);
+    J_u_x.row(0) *= f_u / p_c.z();
+    J_u_x.row(1) *= f_v / p_c.z();
+    *J_u_p << J_u_x, -J_u_x * x;
   }
   if (J_u_lens != nullptr) {
-    *J_u_lens << x_d, 0, 1, 0, f_u * x * r2, f_u * x * r2 * r2, f_u * 2 * x * y,
-        f_u * (r2 + 2 * x * x), 0,  //
-        0, y_d, 0, 1, f_v * y * r2, f_v * y * r2 * r2, f_v * (r2 + 2 * y * y), f_v * 2 * x * y, 0;
+    J_u_lens->setZero();
+    (*J_u_lens)(0, index(LensParameter::kFocalLengthU)) = x_d.x();
+    (*J_u_lens)(1, index(LensParameter::kFocalLengthV)) = x_d.y();
+    J_u_lens->middleCols<2>(index(LensParameter::kCentreU)).setIdentity();
+    J_u_lens->middleCols<BrownDistortion<double>::kCount>(index(LensParameter::kK1)) =
+        distortion.by_terms(x, f_u, f_v);
   }
   return ProjectionStatus::kOk;
 }

@@ -8,6 +8,7 @@
 #include <functional>
 #include <vector>
 
+#include "core/model/lens/zoom_law.h"
 #include "core/model/rotation.h"
 
 namespace alidade {
@@ -23,31 +24,17 @@ struct GridPoint {
   Vector3<double> d;    // camera frame, z = 1
 };
 
-// Sets the direction that the lens shows at u, by Newton's method from the direction without
-// distortion. False: there is none.
+// Sets the direction that the lens shows at u. False: there is none.
 bool unproject_lens(const LensVector& lens, GridPoint* point) {
-  constexpr int kSteps = 30;
-  Vector3<double> d((point->u.x() - lens[index(LensParameter::kCentreU)]) /
-                        lens[index(LensParameter::kFocalLengthU)],
-                    (point->u.y() - lens[index(LensParameter::kCentreV)]) /
-                        lens[index(LensParameter::kFocalLengthV)],
-                    1);
-  // Where the radial terms turn back, it continues from half as far.
-  Vector2<double> u;
-  Matrix<double, 2, 3> J;
-  for (int step = 0; step < kSteps; ++step) {
-    if (project_lens(lens, d, &u, &J) != ProjectionStatus::kOk) {
-      d.head<2>() *= 0.5;
-      continue;
-    }
-    const Vector2<double> error = point->u - u;
-    if (error.norm() < 1e-9) {
-      point->d = d;
-      return true;
-    }
-    d.head<2>() += J.leftCols<2>().inverse() * error;
-  }
-  return false;
+  constexpr double kTolerance_px = 1e-9;
+  const double f_u = lens[index(LensParameter::kFocalLengthU)];
+  const Vector2<double> x_d((point->u.x() - lens[index(LensParameter::kCentreU)]) / f_u,
+                            (point->u.y() - lens[index(LensParameter::kCentreV)]) /
+                                lens[index(LensParameter::kFocalLengthV)]);
+  Vector2<double> x;
+  if (!distortion_of(lens).undistort(x_d, kTolerance_px / f_u, &x)) return false;
+  point->d = {x.x(), x.y(), 1};
+  return true;
 }
 
 std::vector<GridPoint> grid_over(const LensVector& lens, int width, int height) {
@@ -82,7 +69,7 @@ std::optional<Fit> fit(const std::vector<GridPoint>& part, const Camera<double>&
   Eigen::VectorXd error(rows);
   for (int step = 0; step < kSteps; ++step) {
     Camera<double>& camera = result.camera;
-    const double k_unit = camera.distortion_of_corner();
+    const double k_unit = corner_unit(camera)[0];
     for (std::size_t i = 0; i < part.size(); ++i) {
       const Vector3<double> d = R * part[i].d;
       Vector2<double> u;
@@ -91,8 +78,9 @@ std::optional<Fit> fit(const std::vector<GridPoint>& part, const Camera<double>&
       if (project(camera, d, &u, &J_u_d, &J_u_camera) != ProjectionStatus::kOk) return std::nullopt;
       const auto at = static_cast<Eigen::Index>(2 * i);
       error.segment<2>(at) = part[i].u - u;
-      J.block<2, 3>(at, 0) << J_u_camera.col(0) * camera.focal_length,
-          J_u_camera.col(1) * camera.aspect, J_u_camera.col(2) * k_unit;
+      J.block<2, 3>(at, 0) << J_u_camera.col(camera_column::kFocalLength) * camera.focal_length,
+          J_u_camera.col(camera_column::kAspect) * camera.aspect,
+          J_u_camera.col(camera_column::kDistortion) * k_unit;
       J.block<2, 3>(at, 3) = -J_u_d * skew(d);
     }
     const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(J);
@@ -101,7 +89,7 @@ std::optional<Fit> fit(const std::vector<GridPoint>& part, const Camera<double>&
     if (!change.allFinite()) return std::nullopt;
     camera.focal_length *= std::exp(change[0]);
     camera.aspect *= std::exp(change[1]);
-    camera.radial_distortion += k_unit * change[2];
+    camera.distortion.radial += k_unit * change[2];
     R = exp_so3(Vector3<double>(change.tail<3>())) * R;
     if (change.norm() > 1e-10) continue;
     result.rms_px = std::sqrt(error.squaredNorm() / static_cast<double>(rows));
@@ -124,7 +112,7 @@ std::array<Part, 6> parts() {
 }
 
 Vector3<double> parameters_of(const Camera<double>& camera) {
-  return {camera.focal_length, camera.aspect, camera.radial_distortion};
+  return {camera.focal_length, camera.aspect, camera.distortion.radial};
 }
 
 // The fit over the whole image, and its grid.

@@ -9,7 +9,7 @@
 
 #include "core/mapping/features.h"
 #include "core/mapping/map_building.h"
-#include "core/model/zoom_curve.h"
+#include "core/model/lens/zoom_curve.h"
 #include "core/realtime/image/image_view.h"
 #include "platform/storage/recording.h"
 

@@ -10,7 +10,7 @@
 #include "core/mapping/localization.h"
 #include "core/mapping/scene_map.h"
 #include "core/model/calibration.h"
-#include "core/model/zoom_curve.h"
+#include "core/model/lens/zoom_curve.h"
 #include "core/realtime/image/image_view.h"
 
 namespace alidade {

@@ -4,7 +4,7 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "core/model/calibration.h"
-#include "core/model/zoom_curve.h"
+#include "core/model/lens/zoom_curve.h"
 
 namespace alidade {
 

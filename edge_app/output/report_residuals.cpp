@@ -145,7 +145,9 @@ void histograms(ReportPage& page) {
   const std::vector<PlotPoint> telemetry_outline = outline(telemetry);
   std::vector<PlotPoint> gaussian;
   double highest = 0;
-  for (double x = -kReach; x <= kReach; x += 0.05) {
+  constexpr int kSteps = 200;
+  for (int i = 0; i <= kSteps; ++i) {
+    const double x = kReach * (2.0 * i / kSteps - 1);
     gaussian.push_back({x, std::exp(-0.5 * x * x) / std::sqrt(2 * kPi)});
     highest = std::max(highest, gaussian.back().y);
   }

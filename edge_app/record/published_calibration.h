@@ -7,7 +7,7 @@
 #include <string>
 
 #include "core/model/calibration.h"
-#include "core/model/zoom_curve.h"
+#include "core/model/lens/zoom_curve.h"
 #include "core/realtime/oe_mode/map_state.h"
 
 namespace alidade {

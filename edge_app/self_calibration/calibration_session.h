@@ -17,7 +17,7 @@
 
 #include "core/calibration/calibrate.h"
 #include "core/calibration/held_out.h"
-#include "core/model/camera.h"
+#include "core/model/lens/camera.h"
 #include "core/realtime/image/image_view.h"
 #include "edge_app/self_calibration/keyframe_map.h"
 #include "edge_app/self_calibration/packed_image.h"

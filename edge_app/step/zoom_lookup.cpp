@@ -21,9 +21,7 @@ void set_slopes(const ZoomCurve& curve, FrameLens* lens) {
   // Smaller: the lens does not zoom there, or turns over.
   constexpr double kLeast = 1e-6;
   if (!(std::abs(change) > kLeast)) return;
-  lens->corner_by_zoom = (to.radial_distortion / to.distortion_of_corner() -
-                          from.radial_distortion / from.distortion_of_corner()) /
-                         change;
+  lens->corner_by_zoom = (corner_distortion(to)[0] - corner_distortion(from)[0]) / change;
   lens->centre_by_zoom = (to.centre_offset() - from.centre_offset()) / change;
 }
 

@@ -7,7 +7,7 @@
 #include <array>
 #include <cstddef>
 
-#include "core/model/zoom_curve.h"
+#include "core/model/lens/zoom_curve.h"
 #include "core/realtime/oe_mode/frame_lens.h"
 
 namespace alidade {

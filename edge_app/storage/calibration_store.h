@@ -21,7 +21,7 @@
 #include <string>
 #include <vector>
 
-#include "core/model/zoom_curve.h"
+#include "core/model/lens/zoom_curve.h"
 #include "edge_app/self_calibration/calibration_archive.h"
 #include "platform/system/file_lock.h"
 

@@ -102,7 +102,7 @@ class Differences {
           changed.aspect += change;
           break;
         case Parameter::kRadialDistortion:
-          changed.radial_distortion += change;
+          changed.distortion.radial += change;
           break;
         case Parameter::kCentreU:
         case Parameter::kCentreV:

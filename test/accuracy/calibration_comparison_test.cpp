@@ -20,7 +20,7 @@ using ::testing::Not;
 
 Calibration estimate() {
   Calibration c;
-  c.camera = {4002, 1, 0, 1920, 1080};
+  c.camera = {4002, 1, {0}, 1920, 1080};
   c.line_delay = 1.1e-6;
   c.clock_offset = 0.021;
   const int f = index(Parameter::kFocalLength);

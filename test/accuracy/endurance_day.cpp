@@ -263,7 +263,7 @@ VirtualDay::VirtualDay(const DayPlan& plan, const std::filesystem::path& scenes)
     simulator::CameraConfig camera = config_.camera;
     camera.focal_length = std::pow(kWide.focal_length, 1 - zoom) *
                           std::pow(kNarrow.focal_length, zoom) * plan_.width / 480;
-    camera.radial_distortion = between(kWide.radial_distortion, kNarrow.radial_distortion, zoom);
+    camera.distortion.radial = between(kWide.radial_distortion, kNarrow.radial_distortion, zoom);
     return std::make_shared<const simulator::CameraModel>(camera, config_.image, *path_);
   };
   wide_ = lens_of(0);
@@ -441,7 +441,7 @@ std::shared_ptr<const simulator::CameraModel> VirtualDay::lens_at(double time_s)
   const Optics optics = optics_at(time_s);
   simulator::CameraConfig camera = config_.camera;
   camera.focal_length = optics.focal_length;
-  camera.radial_distortion = optics.radial_distortion;
+  camera.distortion.radial = optics.radial_distortion;
   return std::make_shared<const simulator::CameraModel>(camera, config_.image, *path_);
 }
 
@@ -468,8 +468,8 @@ Eigen::Vector3d VirtualDay::direction(std::size_t frame, const Eigen::Vector2d& 
 Calibration VirtualDay::calibration(std::size_t frame) const {
   const Optics optics = optics_at(time(frame));
   Calibration calibration;
-  calibration.camera = {optics.focal_length, 1, optics.radial_distortion, plan_.width,
-                        plan_.height};
+  calibration.camera = {
+      optics.focal_length, 1, {optics.radial_distortion}, plan_.width, plan_.height};
   calibration.line_delay = config_.camera.line_delay;
   calibration.mechanics = {optics.boresight.transpose() * wide_->pan_axis(),
                            optics.boresight.transpose() * wide_->tilt_axis(), 1, 1};

@@ -6,7 +6,7 @@
 #include <fstream>
 #include <stdexcept>
 
-#include "core/model/camera.h"
+#include "core/model/lens/camera.h"
 #include "core/model/mechanics.h"
 #include "core/model/rotation.h"
 #include "edge_app/output/svg_plot.h"

@@ -162,7 +162,7 @@ std::vector<std::string> errors_in_sigmas(const Calibration& found, const Calibr
     return number(std::max(std::abs(error[0]) / sigma(first), std::abs(error[1]) / sigma(second)));
   };
   return {of(found.camera.focal_length - truth.camera.focal_length, Parameter::kFocalLength),
-          of(found.camera.radial_distortion - truth.camera.radial_distortion,
+          of(found.camera.distortion.radial - truth.camera.distortion.radial,
              Parameter::kRadialDistortion),
           of(found.line_delay - truth.line_delay, Parameter::kLineDelay),
           of(found.clock_offset - truth.clock_offset, Parameter::kClockOffset),

@@ -182,7 +182,7 @@ MapAdjustment chain(const Stills& stills) {
   const TruePicture& truth = stills.pictures[kRoot];
   AdjustedPicture known;
   known.R_base_from_camera = truth.R;
-  known.camera = {truth.lens.focal_length, 1, 0, kWidth, kHeight};
+  known.camera = {truth.lens.focal_length, 1, {0}, kWidth, kHeight};
   std::vector<char> reached;
   MapAdjustment out;
   out.pictures = chain_homographies(stills.evidence, kRoot, known, &reached);

@@ -67,7 +67,7 @@ std::map<int, Picture> read(const std::string& people, const std::string& folder
 
 FrameOrientation looking_down(double f, int width, int height) {
   Calibration calibration;
-  calibration.camera = {f, 1, 0, width, height};
+  calibration.camera = {f, 1, {0}, width, height};
   FrameOrientation frame;
   if (!make_frame_orientation(calibration, 0, OrientationMode::kPt, 0, FrameMotion<double>(),
                               MotionCovariance::Zero(), Sensitivity<6>::Zero(), &frame)) {

@@ -121,8 +121,10 @@ std::vector<cv::Mat> RenderedRecording::images(FrameNoise noise) const {
 
 Calibration RenderedRecording::calibration() const {
   Calibration calibration;
-  calibration.camera = {config_.camera.focal_length, config_.camera.aspect,
-                        config_.camera.radial_distortion, config_.image.width,
+  calibration.camera = {config_.camera.focal_length,
+                        config_.camera.aspect,
+                        {config_.camera.distortion.radial},
+                        config_.image.width,
                         config_.image.height};
   calibration.line_delay = config_.camera.line_delay;
   calibration.mechanics = {camera_.pan_axis(), camera_.tilt_axis(), config_.camera.pan_scale,

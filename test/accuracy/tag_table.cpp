@@ -187,7 +187,7 @@ bool read_orientations(const std::string& file, const std::string& mode,
       at.camera = calibration.camera;
       at.camera.focal_length = value("focal_length_px");
       at.camera.aspect = value("aspect");
-      at.camera.radial_distortion = value("radial_distortion");
+      at.camera.distortion.radial = value("radial_distortion");
       at.mechanics = calibration.mechanics;
       at.line_delay = value("line_delay_s");
       at.motion.angle = {value("pan_rad"), value("tilt_rad")};

@@ -38,7 +38,7 @@ class TagTable : public testing::Test {
       RecordedOrientation at;
       at.frame = i;
       at.time_s = 100 + t;
-      at.camera = {21338, 1, 55, 1280, 720};
+      at.camera = {21338, 1, {55}, 1280, 720};
       at.mechanics.tilt_axis = Vector3d(0.006, 1, 0.014).normalized();
       at.line_delay = -21e-6;
       at.motion.angle = {0.012 * std::sin(2.1 * t), 0.008 * std::cos(3.3 * t)};
@@ -243,7 +243,7 @@ TEST(TagDetector, FindsTheTagWhereTheVirtualCameraShowsIt) {
   ASSERT_TRUE(corners.has_value());
   // At rest, forward, without distortion: tangents times f. The diagonals cross in the middle of the photo.
   RecordedOrientation at;
-  at.camera = {8000, 1, 0, 640, 480};
+  at.camera = {8000, 1, {0}, 640, 480};
   const Vector2d expected(320 + 8000 * std::tan(tag.azimuth),
                           240 - 8000 * std::tan(tag.elevation) / std::cos(tag.azimuth));
   Vector2d centre = Vector2d::Zero();

@@ -85,7 +85,7 @@ VideoRecording video_recording(int number) {
   c.duration = slow ? kSlowDuration_s : size.duration_s;
   if (slow) c.image.rate_hz /= 1.5;
   c.camera.focal_length = 0.5 * size.width / std::tan(0.5 * field);
-  c.camera.radial_distortion = pick(kCornerDistortions, number / 2) *
+  c.camera.distortion.radial = pick(kCornerDistortions, number / 2) *
                                std::pow(2 * c.camera.focal_length, 2) /
                                (std::pow(size.width, 2) + std::pow(size.height, 2));
   c.camera.line_delay = pick(kReadouts, number / 5) / (c.image.rate_hz * size.height);
@@ -137,7 +137,7 @@ std::optional<VideoErrors> calibrate_video_recording(const VideoRecording& recor
     const Vector2<double> tilt =
         direction_minus<double>(truth.mechanics.tilt_axis, c.mechanics.tilt_axis);
     errors.plain = {c.camera.focal_length - truth.camera.focal_length,
-                    c.camera.radial_distortion - truth.camera.radial_distortion,
+                    c.camera.distortion.radial - truth.camera.distortion.radial,
                     c.line_delay - truth.line_delay,
                     pan.x(),
                     pan.y(),

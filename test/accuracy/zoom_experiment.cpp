@@ -219,7 +219,7 @@ AloneErrors judge_alone(const ZoomRecording& recording, const Dwells& dwells) {
         lens.centre - Eigen::Vector2d(c.camera.width, c.camera.height) / 2;
     const std::array<double, kZoomQuantityCount> error = {
         c.camera.focal_length - lens.focal_length,
-        c.camera.radial_distortion - lens.radial_distortion, c.camera.centre_u - centre.x(),
+        c.camera.distortion.radial - lens.radial_distortion, c.camera.centre_u - centre.x(),
         c.camera.centre_v - centre.y()};
     constexpr std::array<Parameter, kZoomQuantityCount> kOf = {
         Parameter::kFocalLength, Parameter::kRadialDistortion, Parameter::kCentreU,

@@ -33,7 +33,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/model/camera.h"
+#include "core/model/lens/camera.h"
 #include "core/realtime/oe_mode/oe_mode.h"
 #include "test/benchmark/oe_stages.h"
 #include "test/benchmark/turning_camera.h"

@@ -17,7 +17,7 @@ inline constexpr int kQueries = 1024;
 
 inline Calibration paper_calibration() {
   Calibration calibration;
-  calibration.camera = {32008, 1, 55.4, 1920, 1080};
+  calibration.camera = {32008, 1, {55.4}, 1920, 1080};
   calibration.line_delay = -14.2e-6;
   calibration.clock_offset = -84.4e-3;
   calibration.covariance.diagonal().setConstant(1e-12);

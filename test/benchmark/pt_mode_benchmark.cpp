@@ -89,7 +89,7 @@ Vector3<double> plain_unproject(const Camera<double>& camera, const Vector2<doub
                                   (u.y() - camera.height / 2.0) / camera.focal_length);
   Vector2<double> x = distorted;
   for (int i = 0; i < 100; ++i) {
-    const Vector2<double> next = distorted / (1 + camera.radial_distortion * x.squaredNorm());
+    const Vector2<double> next = distorted / (1 + camera.distortion.radial * x.squaredNorm());
     const double step = (next - x).norm();
     x = next;
     if (step < 1e-14) break;
@@ -110,7 +110,7 @@ Vector2<double> plain_pixel(const FrameOrientation& frame, const Vector3<double>
   for (int i = 0; i < 100; ++i) {
     const Vector3<double> d_c = plain_rotation(frame, u.y()).transpose() * d_b;
     const Vector2<double> x = d_c.head<2>() / d_c.z();
-    const double scale = camera.focal_length * (1 + camera.radial_distortion * x.squaredNorm());
+    const double scale = camera.focal_length * (1 + camera.distortion.radial * x.squaredNorm());
     const Vector2<double> next(scale * x.x() + camera.width / 2.0,
                                scale * x.y() + camera.height / 2.0);
     const double step = (next - u).norm();

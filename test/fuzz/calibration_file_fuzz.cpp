@@ -10,7 +10,7 @@ void require_same(const Calibration& a, const Calibration& b) {
   FUZZ_REQUIRE(a.camera.width == b.camera.width && a.camera.height == b.camera.height);
   FUZZ_REQUIRE(a.camera.focal_length == b.camera.focal_length);
   FUZZ_REQUIRE(a.camera.aspect == b.camera.aspect);
-  FUZZ_REQUIRE(a.camera.radial_distortion == b.camera.radial_distortion);
+  FUZZ_REQUIRE(a.camera.distortion.radial == b.camera.distortion.radial);
   FUZZ_REQUIRE(a.line_delay == b.line_delay && a.clock_offset == b.clock_offset);
   FUZZ_REQUIRE(a.mechanics.pan_axis == b.mechanics.pan_axis);
   FUZZ_REQUIRE(a.mechanics.tilt_axis == b.mechanics.tilt_axis);

@@ -18,7 +18,7 @@ constexpr std::size_t kLandmarkSize = 464;
 const Calibration& some_calibration() {
   static const Calibration calibration = [] {
     Calibration some;
-    some.camera = {32000.0, 1.0, 0.0, 1920, 1080};
+    some.camera = {32000.0, 1.0, {0.0}, 1920, 1080};
     return some;
   }();
   return calibration;

@@ -11,7 +11,7 @@ namespace alidade {
 
 inline OrientationRecord record_of_frame(std::int64_t number) {
   Calibration calibration;
-  calibration.camera = {1000, 1, 0.1, 640, 480};
+  calibration.camera = {1000, 1, {0.1}, 640, 480};
   calibration.line_delay = 30e-6;
   FrameOrientation frame;
   FUZZ_REQUIRE(make_frame_orientation(

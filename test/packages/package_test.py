@@ -110,7 +110,7 @@ class Contents(unittest.TestCase):
                                      for name in ("calibration", "pipeline", "platform", "realtime")})
         self.assertLessEqual({f"{folder}/cmake/alidade/alidade{name}.cmake"
                               for name in ("Config", "ConfigVersion", "Targets", "Targets-release")}, files)
-        for header in ("core/model/camera.h", "core/realtime/oe_mode/oe_mode.h", "platform/system/clock.h"):
+        for header in ("core/model/lens/camera.h", "core/realtime/oe_mode/oe_mode.h", "platform/system/clock.h"):
             self.assertIn(f"usr/include/alidade/{header}", files)
         known = ("usr/include/alidade/", f"{folder}/", "usr/share/doc/alidade-dev/")
         self.assertEqual([f for f in files if not f.startswith(known)], [])

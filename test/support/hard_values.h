@@ -9,8 +9,8 @@
 
 #include "core/model/angle.h"
 #include "core/model/calibration.h"
-#include "core/model/camera.h"
 #include "core/model/direction.h"
+#include "core/model/lens/camera.h"
 #include "core/model/mechanics.h"
 #include "core/model/rolling_shutter.h"
 
@@ -56,15 +56,15 @@ struct NamedCamera {
 };
 
 inline std::vector<NamedCamera> hard_cameras() {
-  return {{"paper", {32008, 1, 55.4, 1920, 1080}, 0.5},
-          {"paper, barrel", {32008, 1, -55.4, 1920, 1080}, 0.2},
-          {"not square", {8000, 1.03, 3, 1280, 720}, 0.5},
-          {"no distortion", {1000, 1, 0, 1280, 720}, 0.5},
-          {"k barely positive", {1000, 1, 1e-18, 1280, 720}, 0.5},
-          {"k barely negative", {1000, 1, -1e-18, 1280, 720}, 0.5},
-          {"wide, pincushion", {600, 0.98, 0.4, 1280, 720}, 0.5},
-          {"wide, barrel", {900, 1, -0.15, 1280, 720}, 0.05},
-          {"off centre", {1500, 1.01, 0.2, 1280, 720, 21.5, -13.25}, 0.5}};
+  return {{"paper", {32008, 1, {55.4}, 1920, 1080}, 0.5},
+          {"paper, barrel", {32008, 1, {-55.4}, 1920, 1080}, 0.2},
+          {"not square", {8000, 1.03, {3}, 1280, 720}, 0.5},
+          {"no distortion", {1000, 1, {0}, 1280, 720}, 0.5},
+          {"k barely positive", {1000, 1, {1e-18}, 1280, 720}, 0.5},
+          {"k barely negative", {1000, 1, {-1e-18}, 1280, 720}, 0.5},
+          {"wide, pincushion", {600, 0.98, {0.4}, 1280, 720}, 0.5},
+          {"wide, barrel", {900, 1, {-0.15}, 1280, 720}, 0.05},
+          {"off centre", {1500, 1.01, {0.2}, 1280, 720, 21.5, -13.25}, 0.5}};
 }
 
 // points_a_side^2 pixels from border to border, margins included.

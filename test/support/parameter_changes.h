@@ -17,7 +17,7 @@ using ParameterVector = Matrix<double, kParameterCount, 1>;
   const Mechanics<double>& mechanics = calibration.mechanics;
   changed.camera.focal_length += e[index(Parameter::kFocalLength)];
   changed.camera.aspect += e[index(Parameter::kAspect)];
-  changed.camera.radial_distortion += e[index(Parameter::kRadialDistortion)];
+  changed.camera.distortion.radial += e[index(Parameter::kRadialDistortion)];
   changed.camera.centre_u += e[index(Parameter::kCentreU)];
   changed.camera.centre_v += e[index(Parameter::kCentreV)];
   changed.line_delay += e[index(Parameter::kLineDelay)];
@@ -37,7 +37,7 @@ using ParameterVector = Matrix<double, kParameterCount, 1>;
   steps[index(Parameter::kFocalLength)] = 1;
   steps[index(Parameter::kAspect)] = 1e-3;
   steps[index(Parameter::kRadialDistortion)] =
-      1e-3 * std::max(1.0, std::abs(camera.radial_distortion));
+      1e-3 * std::max(1.0, std::abs(camera.distortion.radial));
   steps[index(Parameter::kCentreU)] = steps[index(Parameter::kCentreV)] = 1;
   steps[index(Parameter::kLineDelay)] = 1e-7;
   steps[index(Parameter::kClockOffset)] = 1e-3;

@@ -310,7 +310,7 @@ inline Eigen::Matrix<double, kParameterCount, 1> calibration_error(const Simulat
     return Eigen::Vector2d(-direction_minus<double>(truth, estimate));
   };
   error << c.camera.focal_length - s.focal_length, c.camera.aspect - s.aspect,
-      c.camera.radial_distortion - s.radial_distortion,
+      c.camera.distortion.radial - s.radial_distortion,
       c.camera.centre_u - s.optical_centre_offset_px[0],
       c.camera.centre_v - s.optical_centre_offset_px[1], c.line_delay - s.line_delay,
       axis_error(c.mechanics.pan_axis, s.pan_axis), axis_error(c.mechanics.tilt_axis, s.tilt_axis),

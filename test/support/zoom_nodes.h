@@ -17,7 +17,7 @@ inline double zoom_focal_length(double reading) {
 
 inline Calibration zoom_calibration(double reading) {
   Calibration c;
-  c.camera = {zoom_focal_length(reading), 1, 0, 640, 480, 3, -2};
+  c.camera = {zoom_focal_length(reading), 1, {0}, 640, 480, 3, -2};
   c.line_delay = 10e-6;
   c.clock_offset = -0.05;
   c.zoom = reading;

@@ -161,7 +161,7 @@ class ZoomingCamera {
     Calibration out;
     out.camera = {lens.focal_length,
                   lens.aspect,
-                  lens.radial_distortion,
+                  {lens.radial_distortion},
                   config_.image.width,
                   config_.image.height,
                   lens.centre.x() - config_.image.width / 2.0,
@@ -175,7 +175,7 @@ class ZoomingCamera {
     set(Parameter::kRadialDistortion, kCorner_px * k_of_px);
     set(Parameter::kCentreU, kCentre_px);
     set(Parameter::kCentreV, kCentre_px);
-    out.camera.radial_distortion += corner_error_px_ * k_of_px;
+    out.camera.distortion.radial += corner_error_px_ * k_of_px;
     out.camera.set_centre_offset(out.camera.centre_offset() + centre_error_px_);
     return out;
   }
@@ -265,9 +265,7 @@ class ZoomingCamera {
     const Camera<double> from = curve_of(std::max(config_.zoom->reading.wide, z - kStep), 0).camera;
     const Camera<double> to = curve_of(std::min(config_.zoom->reading.tele, z + kStep), 0).camera;
     const double change = std::log(to.focal_length / from.focal_length);
-    lens->corner_by_zoom = (to.radial_distortion / to.distortion_of_corner() -
-                            from.radial_distortion / from.distortion_of_corner()) /
-                           change;
+    lens->corner_by_zoom = (corner_distortion(to)[0] - corner_distortion(from)[0]) / change;
     lens->centre_by_zoom = (to.centre_offset() - from.centre_offset()) / change;
   }
 

@@ -1,6 +1,6 @@
 #pragma once
 // FrameLens: the lens of one frame as known without its image, from a zoom reading and a zoom curve
-// (core/model/zoom_curve.h). Plain values.
+// (core/model/lens/zoom_curve.h). Plain values.
 
 #include "core/model/calibration.h"
 

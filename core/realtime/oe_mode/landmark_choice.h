@@ -13,7 +13,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/model/camera.h"
+#include "core/model/lens/camera.h"
 #include "core/realtime/oe_mode/octaves.h"
 #include "core/realtime/oe_mode/orientation_solve.h"
 #include "core/realtime/oe_mode/visible_landmarks.h"

@@ -202,10 +202,7 @@ bool LandmarkMaker::make_one(const View& view, const FastCorner& corner, int oct
     // The error of the frame's own lens is not the map's scale.
     const OwnLens& own = view.frame.lens;
     const double time_s = time_of_row(view.frame.motion, calibration.line_delay, u.y());
-    const Vector2<double> by_zoom =
-        to_tangent *
-        (J_d_parameters.col(index(Parameter::kFocalLength)) * view.lens->direction_f +
-         J_d_parameters.col(index(Parameter::kRadialDistortion)) * view.lens->direction_k);
+    const Vector2<double> by_zoom = to_tangent * view.lens->by_map_zoom(J_d_parameters);
     sensitivity += by_zoom * own.sensitivity_at(time_s);
     landmark.covariance += own.variance(time_s) * by_zoom * by_zoom.transpose();
   }

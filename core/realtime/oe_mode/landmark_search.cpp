@@ -235,8 +235,7 @@ void LandmarkSearch::fit_fine(const SearchedFrame& frame, const ViewProjection& 
     f.shared_covariance = landmark.shared_covariance;
     if (frame.lens != nullptr) {
       frame.lens->to_map(&J_parameters);
-      f.by_zoom = J_parameters.col(index(Parameter::kFocalLength)) * frame.lens->direction_f +
-                  J_parameters.col(index(Parameter::kRadialDistortion)) * frame.lens->direction_k;
+      f.by_zoom = frame.lens->by_map_zoom(J_parameters);
     }
     f.sensitivity = -J_parameters - J * landmark.sensitivity.cast<double>();
     J_tangent_.push_back(J);

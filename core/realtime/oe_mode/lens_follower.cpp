@@ -65,7 +65,7 @@ Camera<double> LensFollower::with_focal_length(double log_focal_length, const Le
   // Follow the curve only as far as the reading is believed.
   const double most = options_.excluded_sigmas * relative_focal_length_sigma(told);
   const double along = std::clamp(change + scale.value, -most, most);
-  out.radial_distortion += along * reading_->corner_by_zoom * out.distortion_of_corner();
+  out.distortion.radial += along * reading_->corner_by_zoom * corner_unit(out)[0];
   out.set_centre_offset(out.centre_offset() + along * reading_->centre_by_zoom);
   return out;
 }
@@ -112,11 +112,10 @@ ZoomPrior LensFollower::prior(const Camera<double>& camera, double zoom_rate) co
     const double told = reading_ ? reading_->calibration.covariance(index(p), index(p)) : 0;
     out.own_variances[index(p)] = told + unknown * unknown;
   };
-  set(Parameter::kRadialDistortion,
-      options_.distortion_change * since * camera.distortion_of_corner());
+  set(Parameter::kRadialDistortion, options_.distortion_change * since * corner_unit(camera)[0]);
   set(Parameter::kCentreU, options_.centre_change_px * since);
   set(Parameter::kCentreV, options_.centre_change_px * since);
-  out.own_variances[kOfDistortion] /= columns_->of_k * columns_->of_k;
+  out.own_variances[kOfDistortion] /= columns_->of_map[0] * columns_->of_map[0];
   return out;
 }
 
@@ -151,7 +150,7 @@ void LensFollower::note_unknown() {
     const int i = index(p);
     most_unknown_[i] = std::max(most_unknown_[i], told.covariance(i, i) / (unit * unit));
   };
-  note(Parameter::kRadialDistortion, told.camera.distortion_of_corner());
+  note(Parameter::kRadialDistortion, corner_unit(told.camera)[0]);
   note(Parameter::kCentreU, 1);
   note(Parameter::kCentreV, 1);
 }
@@ -167,7 +166,7 @@ ParameterDirection LensFollower::unshared(const LensScale& scale) const {
     const double most = std::max(told.covariance(i, i), unit * unit * most_unknown_[i]);
     out[i] = std::max(0.0, most - in_frame(i, i)) / (column * column);
   };
-  set(Parameter::kRadialDistortion, told.camera.distortion_of_corner(), columns_->of_k);
+  set(Parameter::kRadialDistortion, corner_unit(told.camera)[0], columns_->of_map[0]);
   set(Parameter::kCentreU, 1, 1);
   set(Parameter::kCentreV, 1, 1);
   return out;
@@ -191,14 +190,13 @@ Calibration LensFollower::answer(const Calibration& calibration, const OwnLens& 
   const double by_own_errors =
       (of_it * own_errors.asDiagonal() * of_it.transpose()).value() +
       own_errors[kOfDistortion] *
-          std::pow(columns_->of_k / calibration.camera.distortion_of_corner(), 2);
+          std::pow(columns_->of_map[0] / corner_unit(calibration.camera)[0], 2);
   Calibration out =
       scale.at(calibration, phi, variance + of_lens + unknown * unknown + by_own_errors,
                sensitivity + of_it);
   out.covariance.diagonal() += own_errors;
   columns_->to_frame(&out.covariance);
-  out.covariance(kOfDistortion, kOfDistortion) +=
-      std::pow(unknown * out.camera.distortion_of_corner(), 2);
+  out.covariance(kOfDistortion, kOfDistortion) += std::pow(unknown * corner_unit(out.camera)[0], 2);
   for (const Parameter p : {Parameter::kCentreU, Parameter::kCentreV}) {
     out.covariance(index(p), index(p)) += std::pow(options_.centre_change_px * since, 2);
   }

@@ -6,22 +6,17 @@
 namespace alidade {
 namespace {
 
-constexpr int kOfF = index(Parameter::kFocalLength);
-constexpr int kOfK = index(Parameter::kRadialDistortion);
-
-ParameterDirection direction_at(const Camera<double>& camera, bool with_distortion) {
-  ParameterDirection a = ParameterDirection::Zero();
-  a[kOfF] = camera.focal_length;
-  if (with_distortion) a[kOfK] = 2 * camera.radial_distortion;
-  return a;
-}
+constexpr int kOfF = camera_column::kFocalLength;
 
 }  // namespace
 
 LensScale LensScale::begin(const Calibration& calibration) {
   LensScale out;
   const ParameterCovariance<double>& P = calibration.covariance;
-  out.direction = direction_at(calibration.camera, P(kOfK, kOfK) > 0);
+  out.direction.head<kCameraParameterCount>() = by_zoom(calibration.camera);
+  for (int k = camera_column::kDistortion; k < camera_column::kCentreU; ++k) {
+    if (!(P(k, k) > 0)) out.direction[k] = 0;
+  }
   const double f = calibration.camera.focal_length;
   const double variance = P(kOfF, kOfF) / (f * f);
   if (!(variance > 0) || !std::isfinite(variance)) return out;
@@ -94,28 +89,31 @@ void LensScale::move_calibration(double phi, Calibration* calibration) {
 }
 
 ParameterDirection LensScale::move(double phi, Camera<double>* camera) const {
-  const bool with_distortion = direction[kOfK] != 0;
   const double factor = std::exp(phi);
-  camera->focal_length *= factor;
-  if (with_distortion) camera->radial_distortion *= factor * factor;
-  ParameterDirection moved = direction;
-  moved[kOfF] *= factor;
-  moved[kOfK] *= factor * factor;
-  return moved;
+  const Distortion<double> before = camera->distortion;
+  zoom_by(factor, camera);
+  for (int i = 0; i < kDistortionCount; ++i) {
+    const bool is_exact = direction[camera_column::kDistortion + i] == 0;
+    if (is_exact) camera->distortion[i] = before[i];
+  }
+  Matrix<double, 1, kParameterCount> moved = direction.transpose();
+  refer_to_unzoomed(factor, &moved);
+  return moved.transpose();
 }
 
 LensColumns::LensColumns(const LensScale& lens, const Camera<double>& camera)
-    : focal_length(camera.focal_length),
-      by_zoom(2 * camera.radial_distortion),
-      direction_f(lens.direction[kOfF]),
-      direction_k(lens.direction[kOfK]),
-      of_k(std::pow(focal_length / direction_f, 2)) {}
+    : along(by_zoom(camera)),
+      map_along(lens.direction.head<kCameraParameterCount>()),
+      of_map(distortion_by_factor(along[kOfF] / map_along[kOfF])) {}
 
 void LensColumns::to_frame(ParameterCovariance<double>* covariance) const {
   ParameterCovariance<double> D = ParameterCovariance<double>::Identity();
-  D(kOfF, kOfF) = focal_length / direction_f;
-  D(kOfK, kOfF) = (by_zoom - of_k * direction_k) / direction_f;
-  D(kOfK, kOfK) = of_k;
+  D(kOfF, kOfF) = along[kOfF] / map_along[kOfF];
+  for (int i = 0; i < kDistortionCount; ++i) {
+    const int k = camera_column::kDistortion + i;
+    D(k, kOfF) = (along[k] - of_map[i] * map_along[k]) / map_along[kOfF];
+    D(k, k) = of_map[i];
+  }
   *covariance = (D * *covariance * D.transpose()).eval();
   *covariance = symmetric<kParameterCount>(*covariance);
 }

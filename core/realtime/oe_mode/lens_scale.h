@@ -2,8 +2,8 @@
 // LensScale: phi, the difference of log f from the map's calibration, as a lens does not return
 // exactly to its zoom curve (zoom_curve.h). Learnt with the map's offset g, as telemetry ties the
 // two.
-//   f(phi) = f exp(phi),   k(phi) = k exp(2 phi): same distortion in the corner; an exact k stays
-//   d / d phi = S a of all that has a Sensitivity S;  a = (f, 2 k or 0) at parameters f, k, else 0
+//   the camera at phi: zoomed by phi (zoom_law.h); a distortion that is exact stays
+//   d / d phi = S a of all that has a Sensitivity S;  a: by_zoom() of the camera, 0 where exact
 // Errors: those of the calibration are a phi + e; e, of covariance `others`, is independent of what
 // follows. (g, phi) have their own noise plus their sensitivity times e. Landmarks and motions are
 // stored for phi = 0; S a is their change with phi.
@@ -11,6 +11,7 @@
 // camera then has its own f times exp(phi); see LensColumns. Plain values; no allocation.
 
 #include "core/model/calibration.h"
+#include "core/model/lens/zoom_law.h"
 #include "core/realtime/oe_mode/covariance.h"
 
 namespace alidade {
@@ -45,9 +46,12 @@ struct LensScale {
   // Sets the column of f so that S a = 0: d / d phi is then not in the sensitivity.
   template <int kRows>
   void make_independent(Sensitivity<kRows>* sensitivity_of_it) const {
-    const int f = index(Parameter::kFocalLength);
-    const int k = index(Parameter::kRadialDistortion);
-    sensitivity_of_it->col(f) = -(direction[k] / direction[f]) * sensitivity_of_it->col(k);
+    constexpr int f = camera_column::kFocalLength;
+    Matrix<double, kRows, 1> column = Matrix<double, kRows, 1>::Zero();
+    for (int k = camera_column::kDistortion; k < camera_column::kCentreU; ++k) {
+      column -= (direction[k] / direction[f]) * sensitivity_of_it->col(k);
+    }
+    sensitivity_of_it->col(f) = column;
   }
   // Moves the calibration to `phi`, without its covariance. phi then counts from there.
   void move_calibration(double phi, Calibration* calibration);
@@ -57,10 +61,9 @@ struct LensScale {
   [[nodiscard]] ParameterDirection move(double phi, Camera<double>* camera) const;
 };
 
-// Converts parameter columns of a frame's own lens to the map's, with the map's lens a = (f_a,
-// a_k):
-//   change of log f at constant distortion in the corner    f_a: in the column of f
-//   change of the distortion in the corner                  k (f_a / f)^2: in the column of k
+// Converts parameter columns of a frame's own lens to the map's, with the map's lens a:
+//   change of log f at constant distortion in the corner    a: in the column of f
+//   change of a term's distortion in the corner             of_map: in the column of the term
 // All other columns are the same for both. d / d phi stays S a.
 struct LensColumns {
   // camera: the frame's.
@@ -68,25 +71,42 @@ struct LensColumns {
 
   template <int kRows>
   void to_map(Sensitivity<kRows>* S) const {
-    const int f = index(Parameter::kFocalLength);
-    const int k = index(Parameter::kRadialDistortion);
-    S->col(f) =
-        (S->col(f) * focal_length + S->col(k) * (by_zoom - of_k * direction_k)) / direction_f;
-    S->col(k) *= of_k;
+    constexpr int f = camera_column::kFocalLength;
+    Matrix<double, kRows, 1> column = S->col(f) * along[f];
+    for (int i = 0; i < kDistortionCount; ++i) {
+      const int k = camera_column::kDistortion + i;
+      column += S->col(k) * (along[k] - of_map[i] * map_along[k]);
+      S->col(k) *= of_map[i];
+    }
+    S->col(f) = column / map_along[f];
   }
   template <int kRows>
   void to_frame(Sensitivity<kRows>* S) const {
-    const int f = index(Parameter::kFocalLength);
-    const int k = index(Parameter::kRadialDistortion);
-    S->col(k) /= of_k;
-    S->col(f) =
-        (S->col(f) * direction_f - S->col(k) * (by_zoom - of_k * direction_k)) / focal_length;
+    constexpr int f = camera_column::kFocalLength;
+    Matrix<double, kRows, 1> column = S->col(f) * map_along[f];
+    for (int i = 0; i < kDistortionCount; ++i) {
+      const int k = camera_column::kDistortion + i;
+      S->col(k) /= of_map[i];
+      column -= S->col(k) * (along[k] - of_map[i] * map_along[k]);
+    }
+    S->col(f) = column / along[f];
   }
   void to_frame(ParameterCovariance<double>* covariance) const;
 
-  double focal_length, by_zoom;     // of the frame's lens: f, d k / d log f
-  double direction_f, direction_k;  // a
-  double of_k;                      // (f / f_a)^2
+  // d y / d phi, from y's columns in the map's lens.
+  template <int kRows>
+  [[nodiscard]] Matrix<double, kRows, 1> by_map_zoom(const Sensitivity<kRows>& J) const {
+    constexpr int f = camera_column::kFocalLength;
+    Matrix<double, kRows, 1> out = J.col(f) * map_along[f];
+    for (int k = camera_column::kDistortion; k < camera_column::kCentreU; ++k) {
+      out += J.col(k) * map_along[k];
+    }
+    return out;
+  }
+
+  CameraColumn<double> along;       // of the frame's lens: d camera / d log f
+  CameraColumn<double> map_along;   // a
+  CornerDistortion<double> of_map;  // what a term is multiplied by from the map's f to the frame's
 };
 
 }  // namespace alidade

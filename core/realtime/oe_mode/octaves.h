@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/model/camera.h"
+#include "core/model/lens/camera.h"
 #include "core/model/linear_algebra.h"
 #include "core/realtime/image/patch_alignment.h"
 #include "core/realtime/image/pyramid.h"

@@ -15,7 +15,8 @@
 #include <cmath>
 
 #include "core/model/calibration.h"
-#include "core/model/camera.h"
+#include "core/model/lens/camera.h"
+#include "core/model/lens/zoom_law.h"
 #include "core/model/rolling_shutter.h"
 
 namespace alidade {
@@ -101,8 +102,7 @@ class ViewProjection {
     if (J_parameters == nullptr) return true;
     J_parameters->setZero();
     const Vector2<double> by_zoom = alidade::by_zoom(camera_, J_u_camera);
-    J_u_camera.col(index(Parameter::kFocalLength)) *= to_middle_row_;
-    J_u_camera.col(index(Parameter::kRadialDistortion)) *= to_middle_row_ * to_middle_row_;
+    refer_to_unzoomed(to_middle_row_, &J_u_camera);
     J_parameters->leftCols<kCameraParameterCount>() = J_u_fixed * J_u_camera;
     const PanTilt<double> rate = rate_at_row(motion_, line_delay_, out->u.y());
     J_parameters->col(index(Parameter::kLineDelay)) =

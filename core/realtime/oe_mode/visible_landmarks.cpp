@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/model/camera.h"
+#include "core/model/lens/camera.h"
 #include "core/realtime/image/ask_ahead.h"
 #include "core/realtime/oe_mode/octaves.h"
 #include "core/realtime/oe_mode/view_projection.h"

@@ -66,8 +66,8 @@ inline AdjustmentProblem make_adjustment_problem(Simulation simulation, double k
   problem.data.reference_s = 0.5 * (telemetry.front().time_s + telemetry.back().time_s);
 
   internal::AdjustmentState& start = problem.start;
-  start.camera = {1.02 * simulation.focal_length, simulation.aspect, 0, simulation.width,
-                  simulation.height};
+  start.camera = {
+      1.02 * simulation.focal_length, simulation.aspect, {0}, simulation.width, simulation.height};
   start.readout_s = 0;
   start.shift_s = simulation.clock_offset + 1e-3;
   const auto trajectory =

@@ -21,8 +21,8 @@ struct AdjustmentScene {
 inline AdjustmentScene make_adjustment_scene(double readout_s = 0.02) {
   AdjustmentScene scene;
   ::alidade::internal::AdjustmentState& s = scene.state;
-  s.camera = {3000, 1.02, 0, 1920, 1080};
-  s.distortion = 0.02;
+  s.camera = {3000, 1.02, {0}, 1920, 1080};
+  s.corner_distortion[0] = 0.02;
   s.readout_s = readout_s;
   s.mechanics.pan_axis = Vector3<double>(0.03, -0.01, 1).normalized();
   s.mechanics.tilt_axis = Vector3<double>(-0.02, 1, 0.04).normalized();

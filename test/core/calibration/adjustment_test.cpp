@@ -120,7 +120,7 @@ TEST(Adjustment, GradientOfThePriorsIsTheDerivativeOfTheirCost) {
   AdjustmentState& mean = scene.priors.mean;
   mean.camera.focal_length *= 1.1;
   mean.camera.aspect *= 0.97;
-  mean.distortion += 0.1;
+  mean.corner_distortion[0] += 0.1;
   mean.readout_s += 0.01;
   mean.mechanics.pan_axis = Vector3<double>(0.5, -0.4, 1).normalized();
   mean.mechanics.tilt_axis = Vector3<double>(0.3, 1, -0.4).normalized();
@@ -281,7 +281,7 @@ TEST(Adjustment, NormalMatrixIsTheDerivativeOfItsGradientAtThePerfectFit) {
     for (std::size_t i = at.touched_begin[l]; i < at.touched_begin[l + 1]; ++i) {
       H.block<2, 2>(row, 2 * at.touched[i]) = at.H_touched[i].transpose();
     }
-    H.block<2, kCameraCount>(row, size - kGlobalCount) = at.H_camera[l].transpose();
+    H.block<2, kObservedCount>(row, size - kGlobalCount) = at.H_camera[l].transpose();
   }
   H = H.selfadjointView<Eigen::Lower>();
   int checked = 0;
@@ -333,8 +333,8 @@ TEST(Adjustment, EliminatingLandmarksGivesTheSolutionOfTheWholeSystem) {
         left.segment<2>(2 * at.touched[i]) += at.H_touched[i] * x_landmark[l];
         row += at.H_touched[i].transpose() * x.segment<2>(2 * at.touched[i]);
       }
-      left.segment<kCameraCount>(x.size() - kGlobalCount) += at.H_camera[l] * x_landmark[l];
-      row += at.H_camera[l].transpose() * x.segment<kCameraCount>(x.size() - kGlobalCount);
+      left.segment<kObservedCount>(x.size() - kGlobalCount) += at.H_camera[l] * x_landmark[l];
+      row += at.H_camera[l].transpose() * x.segment<kObservedCount>(x.size() - kGlobalCount);
       EXPECT_LE((row - at.g_landmark[l]).norm(), 1e-9 * scale);
     }
     EXPECT_LE((left - at.g).norm(), 1e-9 * scale);
@@ -353,7 +353,7 @@ TEST(Adjustment, ConvergesFromFarAwayAndHoldsWhatIsFixed) {
   Adjustment adjustment(scene.data, scene.priors, scene.fixed);
   AdjustmentState start = scene.state;
   start.camera.focal_length *= 1.2;
-  start.distortion = 0;
+  start.corner_distortion[0] = 0;
   start.readout_s = 0;
   start.shift_s += 0.005;
   Linearisation at;

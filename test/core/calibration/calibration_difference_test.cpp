@@ -18,7 +18,7 @@ namespace {
 // Sigmas that differ by many orders of magnitude, and correlations.
 Calibration some_calibration() {
   Calibration c;
-  c.camera = {21000, 1, 14, 1920, 1080};
+  c.camera = {21000, 1, {14}, 1920, 1080};
   c.line_delay = -1.4e-5;
   c.mechanics.pan_axis = Vector3<double>(0.02, -0.01, 1).normalized();
   c.mechanics.tilt_axis = Vector3<double>(-0.03, 1, 0.02).normalized();
@@ -35,7 +35,7 @@ Calibration some_calibration() {
 Calibration moved(const Calibration& from, const Eigen::Matrix<double, kParameterCount, 1>& d) {
   Calibration c = from;
   c.camera.focal_length += d[index(Parameter::kFocalLength)];
-  c.camera.radial_distortion += d[index(Parameter::kRadialDistortion)];
+  c.camera.distortion.radial += d[index(Parameter::kRadialDistortion)];
   c.line_delay += d[index(Parameter::kLineDelay)];
   c.mechanics.pan_axis =
       direction_plus<double>(c.mechanics.pan_axis, d.segment<2>(index(Parameter::kPanAxis0)));
@@ -120,7 +120,7 @@ TEST(Calibration, ItsParametersAreTheNumbersOfItsMembers) {
   const std::vector<std::pair<Parameter, double*>> members = {
       {Parameter::kFocalLength, &c.camera.focal_length},
       {Parameter::kAspect, &c.camera.aspect},
-      {Parameter::kRadialDistortion, &c.camera.radial_distortion},
+      {Parameter::kRadialDistortion, &c.camera.distortion.radial},
       {Parameter::kCentreU, &c.camera.centre_u},
       {Parameter::kCentreV, &c.camera.centre_v},
       {Parameter::kLineDelay, &c.line_delay},

@@ -19,7 +19,7 @@ using ::testing::StartsWith;
 // The paper's calibration with numbers that decimals cannot hold.
 Calibration paper_calibration() {
   Calibration calibration;
-  calibration.camera = {32008 + 1 / 3.0, 1 - 1e-16, 55.4, 1920, 1080};
+  calibration.camera = {32008 + 1 / 3.0, 1 - 1e-16, {55.4}, 1920, 1080};
   calibration.camera.set_centre_offset({-7.1, 1 / 3.0});
   calibration.line_delay = -14.2e-6;
   calibration.mechanics.pan_axis = Vector3<double>(-0.012, 0.001, 1).normalized();
@@ -58,7 +58,7 @@ bool same_bits(const Eigen::MatrixBase<Derived>& a, const Eigen::MatrixBase<Deri
 void expect_same_bits(const Calibration& a, const Calibration& b) {
   EXPECT_TRUE(same_bits(a.camera.focal_length, b.camera.focal_length));
   EXPECT_TRUE(same_bits(a.camera.aspect, b.camera.aspect));
-  EXPECT_TRUE(same_bits(a.camera.radial_distortion, b.camera.radial_distortion));
+  EXPECT_TRUE(same_bits(a.camera.distortion.radial, b.camera.distortion.radial));
   EXPECT_TRUE(same_bits(a.camera.centre_offset(), b.camera.centre_offset()));
   EXPECT_EQ(a.camera.width, b.camera.width);
   EXPECT_EQ(a.camera.height, b.camera.height);
@@ -119,7 +119,7 @@ TEST(CalibrationText, ReadsWhatAPersonWrote) {
   EXPECT_EQ(calibration.camera.width, 1920);
   EXPECT_EQ(calibration.camera.height, 1080);
   EXPECT_EQ(calibration.camera.focal_length, 32008);
-  EXPECT_EQ(calibration.camera.radial_distortion, 55.4);
+  EXPECT_EQ(calibration.camera.distortion.radial, 55.4);
   EXPECT_EQ(calibration.line_delay, -14.2e-6);
   EXPECT_EQ(calibration.clock_offset, -84.4e-3);
   EXPECT_FALSE(calibration.zoom);
@@ -189,9 +189,9 @@ TEST(CalibrationText, RoundTripIsExactForAnyNumber) {
   int checked = 0;
   for (int i = 0; i < 200; ++i) {
     Calibration calibration = paper_calibration();
-    calibration.camera.radial_distortion = std::pow(10, exponent(generator));
+    calibration.camera.distortion.radial = std::pow(10, exponent(generator));
     calibration.line_delay = -0.0;
-    calibration.zoom = -calibration.camera.radial_distortion;
+    calibration.zoom = -calibration.camera.distortion.radial;
     expect_same_bits(parsed(format_calibration(calibration)), calibration);
     ++checked;
   }

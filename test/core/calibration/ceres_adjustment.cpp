@@ -84,8 +84,8 @@ class Shared final : public ceres::EvaluationCallback {
     camera.focal_length = std::exp(blocks_.lens[0]);
     camera.aspect = std::exp(blocks_.log_aspect);
     camera.set_centre_offset(blocks_.centre);
-    distortion_unit = camera.distortion_of_corner();
-    camera.radial_distortion = blocks_.lens[1] * distortion_unit;
+    distortion_unit = corner_unit(camera)[0];
+    camera.distortion.radial = blocks_.lens[1] * distortion_unit;
     line_delay = blocks_.timing[0] / camera.height;
     mechanics.pan_axis = blocks_.pan_axis;
     mechanics.tilt_axis = blocks_.tilt_axis;
@@ -202,7 +202,7 @@ class ObservationCost final : public ceres::SizedCostFunction<2, 2, 2, 2, 2, 2, 
     if (jacobians[4] != nullptr) {
       RowMajor<2, 2> J_lens(jacobians[4]);
       J_lens.col(0) = whiten * (camera.focal_length * J.J_u_camera.col(0) +
-                                2 * camera.radial_distortion * J.J_u_camera.col(2));
+                                2 * camera.distortion.radial * J.J_u_camera.col(2));
       J_lens.col(1) = whiten * (shared_.distortion_unit * J.J_u_camera.col(2));
     }
     if (jacobians[5] != nullptr) {
@@ -358,7 +358,8 @@ class PriorCost final : public ceres::SizedCostFunction<kGlobalCount, 2, 2, 3, 3
     Eigen::Map<GlobalVector> e(residuals);
     const double stretch = std::exp(2 * (parameters[0][0] - std::log(mean_.camera.focal_length)));
     e[index(Parameter::kFocalLength)] = std::log(mean_.camera.focal_length) - parameters[0][0];
-    e[index(Parameter::kRadialDistortion)] = mean_.distortion - parameters[0][1] * stretch;
+    e[index(Parameter::kRadialDistortion)] =
+        mean_.corner_distortion[0] - parameters[0][1] * stretch;
     e.segment<2>(index(Parameter::kCentreU)) = mean_.camera.centre_offset() - Map2(parameters[8]);
     e[index(Parameter::kLineDelay)] = mean_.readout_s - parameters[1][0];
     e[index(Parameter::kClockOffset)] = mean_.shift_s - parameters[1][1];
@@ -431,7 +432,7 @@ struct CeresAdjustment::Implementation {
                  const std::array<bool, kGlobalCount>& fixed_in, const LossScales& loss,
                  ObservationRow row, const AdjustmentState& start)
       : data(data_in), priors(priors_in), fixed(fixed_in), state(start), shared(state, blocks) {
-    blocks.lens << std::log(state.camera.focal_length), state.distortion;
+    blocks.lens << std::log(state.camera.focal_length), state.corner_distortion[0];
     blocks.centre = state.camera.centre_offset();
     blocks.log_aspect = std::log(state.camera.aspect);
     blocks.timing << state.readout_s, state.shift_s;
@@ -536,7 +537,7 @@ struct CeresAdjustment::Implementation {
 
   void read_blocks() {
     state.camera.focal_length = std::exp(blocks.lens[0]);
-    state.distortion = blocks.lens[1];
+    state.corner_distortion[0] = blocks.lens[1];
     state.camera.aspect = std::exp(blocks.log_aspect);
     state.camera.set_centre_offset(blocks.centre);
     state.readout_s = blocks.timing[0];

@@ -68,13 +68,14 @@ class Model {
     using std::pow;
     const double R = 0.5 * std::hypot(state.camera.width, state.camera.height);
     const S f = state.camera.focal_length * exp(change(Parameter::kFocalLength));
-    camera_ = {f,
-               state.camera.aspect * exp(change(Parameter::kAspect)),
-               (state.distortion + change(Parameter::kRadialDistortion)) * f * f / (R * R),
-               state.camera.width,
-               state.camera.height,
-               state.camera.centre_u + change(Parameter::kCentreU),
-               state.camera.centre_v + change(Parameter::kCentreV)};
+    camera_ = {
+        f,
+        state.camera.aspect * exp(change(Parameter::kAspect)),
+        {(state.corner_distortion[0] + change(Parameter::kRadialDistortion)) * f * f / (R * R)},
+        state.camera.width,
+        state.camera.height,
+        state.camera.centre_u + change(Parameter::kCentreU),
+        state.camera.centre_v + change(Parameter::kCentreV)};
     line_delay_ = (state.readout_s + change(Parameter::kLineDelay)) / S(state.camera.height);
     mechanics_ = {axis(state.mechanics.pan_axis, Parameter::kPanAxis0),
                   axis(state.mechanics.tilt_axis, Parameter::kTiltAxis0),
@@ -147,7 +148,7 @@ class Model {
     const double f = mean.camera.focal_length;
     Eigen::Matrix<S, kGlobalCount, 1> e;
     e << log(f / camera_.focal_length), log(mean.camera.aspect / camera_.aspect),
-        mean.distortion - camera_.radial_distortion * (R * R / (f * f)),
+        mean.corner_distortion[0] - camera_.distortion.radial * (R * R / (f * f)),
         mean.camera.centre_u - camera_.centre_u, mean.camera.centre_v - camera_.centre_v,
         mean.readout_s - line_delay_ * S(state_.camera.height),
         -direction_minus<S>(mechanics_.pan_axis, mean.mechanics.pan_axis.cast<S>()),
@@ -213,8 +214,8 @@ std::vector<Ugly> ugly_scenes() {
 AdjustmentProblem make_ugly_problem(const Ugly& ugly) {
   AdjustmentProblem problem;
   AdjustmentState& s = problem.start;
-  s.camera = {ugly.focal_length, ugly.aspect, 0, 1920, 1080, 14, -9};
-  s.distortion = ugly.distortion;
+  s.camera = {ugly.focal_length, ugly.aspect, {0}, 1920, 1080, 14, -9};
+  s.corner_distortion[0] = ugly.corner_distortion[0];
   s.readout_s = ugly.readout_s;
   s.mechanics.pan_axis = Vector3<double>(0.03, -0.01, 1).normalized();
   s.mechanics.tilt_axis = Vector3<double>(-0.02, 1, 0.04).normalized();
@@ -279,7 +280,7 @@ AdjustmentProblem make_ugly_problem(const Ugly& ugly) {
   mean = s;
   mean.camera.focal_length *= 1.05;
   mean.camera.aspect *= 0.97;
-  mean.distortion += 0.05;
+  mean.corner_distortion[0] += 0.05;
   mean.camera.set_centre_offset({-3, 20});
   mean.readout_s += 0.01;
   mean.mechanics.pan_axis = direction_plus(s.mechanics.pan_axis, Vector2<double>(0.05, -0.1));
@@ -348,7 +349,7 @@ void full_system(const Linearisation& at, Eigen::MatrixXd* H, Eigen::VectorXd* g
     for (std::size_t i = at.touched_begin[l]; i < at.touched_begin[l + 1]; ++i) {
       H->block<2, 2>(row, 2 * at.touched[i]) = at.H_touched[i].transpose();
     }
-    H->block<2, internal::kCameraCount>(row, size - kGlobalCount) = at.H_camera[l].transpose();
+    H->block<2, internal::kObservedCount>(row, size - kGlobalCount) = at.H_camera[l].transpose();
   }
   *H = H->selfadjointView<Eigen::Lower>();
 }
@@ -469,7 +470,7 @@ std::vector<Recording> recordings() {
 internal::GlobalVector difference(const AdjustmentState& a, const AdjustmentState& b) {
   internal::GlobalVector d;
   d << std::log(b.camera.focal_length / a.camera.focal_length),
-      std::log(b.camera.aspect / a.camera.aspect), b.distortion - a.distortion,
+      std::log(b.camera.aspect / a.camera.aspect), b.corner_distortion[0] - a.corner_distortion[0],
       b.camera.centre_u - a.camera.centre_u, b.camera.centre_v - a.camera.centre_v,
       b.readout_s - a.readout_s,
       direction_minus<double>(b.mechanics.pan_axis, a.mechanics.pan_axis),

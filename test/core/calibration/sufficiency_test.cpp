@@ -16,7 +16,7 @@ using ::testing::IsEmpty;
 CalibrationResult good_result() {
   CalibrationResult result;
   Calibration& c = result.calibration;
-  c.camera = {2000, 1, 0.1, 1920, 1080};
+  c.camera = {2000, 1, {0.1}, 1920, 1080};
   c.line_delay = 10e-6;
   c.clock_offset = 0.02;
   const auto set = [&c](Parameter p, double sigma) {

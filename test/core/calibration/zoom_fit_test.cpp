@@ -131,7 +131,7 @@ TEST(ZoomFit, ErrorsAreWhatItsCovarianceSays) {
       const double f = std::exp(visits[static_cast<std::size_t>(i)].log_f);
       const double k =
           true_corner_distortion(share) * std::pow(2 * f / std::hypot(kWidth, kHeight), 2);
-      Vector4<double> error_of(c.camera.focal_length - f, c.camera.radial_distortion - k,
+      Vector4<double> error_of(c.camera.focal_length - f, c.camera.distortion.radial - k,
                                c.camera.centre_u - true_centre(share).x(),
                                c.camera.centre_v - true_centre(share).y());
       constexpr std::array<Parameter, 4> kLens = {Parameter::kFocalLength,
@@ -273,7 +273,7 @@ TEST(ZoomFit, CovarianceOfACalibrationBetweenIsThatOfDraws) {
   std::normal_distribution<double> normal;
   Matrix4<double> sum = Matrix4<double>::Zero();
   const auto lens = [](const Calibration& c) {
-    return Vector4<double>(c.camera.focal_length, c.camera.radial_distortion, c.camera.centre_u,
+    return Vector4<double>(c.camera.focal_length, c.camera.distortion.radial, c.camera.centre_u,
                            c.camera.centre_v);
   };
   for (int draw = 0; draw < kDraws; ++draw) {
@@ -417,7 +417,7 @@ CurveDifference difference(const Calibration& of, const Calibration& other) {
         worst.sigma, std::abs(std::log(std::sqrt(other.covariance(index(p), index(p))) / sigma)));
   };
   compare(of.camera.focal_length, other.camera.focal_length, Parameter::kFocalLength);
-  compare(of.camera.radial_distortion, other.camera.radial_distortion,
+  compare(of.camera.distortion.radial, other.camera.distortion.radial,
           Parameter::kRadialDistortion);
   compare(of.camera.centre_u, other.camera.centre_u, Parameter::kCentreU);
   compare(of.camera.centre_v, other.camera.centre_v, Parameter::kCentreV);

@@ -16,7 +16,7 @@ namespace {
 FrameOrientation turned(double pan, double tilt, double rate) {
   Calibration calibration;
   // 7 % of distortion in the corners.
-  calibration.camera = {21339, 1, 0.07 * 21339 * 21339 / (734.0 * 734.0), 1280, 720};
+  calibration.camera = {21339, 1, {0.07 * 21339 * 21339 / (734.0 * 734.0)}, 1280, 720};
   calibration.line_delay = 25e-6;
   calibration.mechanics.tilt_axis = direction_plus(Vector3<double>(0, 1, 0), {0.01, 0.01});
   FrameMotion<double> motion;

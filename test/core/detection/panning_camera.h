@@ -38,7 +38,7 @@ class PanningCamera {
       wave = {number * std::cos(direction), number * std::sin(direction),
               2 * kPi * uniform(random_)};
     }
-    calibration.camera = {focal_length, 1, 30, kPanWidth, kPanHeight};
+    calibration.camera = {focal_length, 1, {30}, kPanWidth, kPanHeight};
     calibration.line_delay = -60e-6;
   }
 

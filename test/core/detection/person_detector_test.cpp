@@ -21,7 +21,7 @@ WorldPlane below(double height_m) {
 
 FrameOrientation straight_on(double pan = 0) {
   Calibration calibration;
-  calibration.camera = {400, 1, 0, kPeopleWidth, kPeopleHeight};
+  calibration.camera = {400, 1, {0}, kPeopleWidth, kPeopleHeight};
   FrameMotion<double> motion;
   motion.angle.pan = pan;
   FrameOrientation frame;

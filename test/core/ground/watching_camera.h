@@ -27,7 +27,7 @@ inline Calibration watching_calibration(double focal_length_px = 2000) {
   calibration.camera.focal_length = focal_length_px;
   calibration.camera.width = 1920;
   calibration.camera.height = 1080;
-  calibration.camera.radial_distortion = -0.1;
+  calibration.camera.distortion.radial = -0.1;
   calibration.line_delay = 25e-6;
   calibration.mechanics.tilt_axis = direction_plus(Vector3<double>(0, 1, 0), {0.004, -0.003});
   calibration.clock_offset = -0.03;
@@ -56,7 +56,7 @@ inline FrameOrientation watching_frame(const Calibration& calibration, double pa
 // The same camera as the paper has it: no distortion, all rows at once.
 inline FrameOrientation global_shutter_frame(double focal_length_px, double pan, double tilt) {
   Calibration calibration = watching_calibration(focal_length_px);
-  calibration.camera.radial_distortion = 0;
+  calibration.camera.distortion.radial = 0;
   calibration.line_delay = 0;
   return watching_frame(calibration, pan, tilt);
 }

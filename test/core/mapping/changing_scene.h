@@ -83,7 +83,7 @@ class ChangingScene {
   }
 
   [[nodiscard]] LensCurve lens() const {
-    return LensCurve::of({kFocalLength, 1, lens_.radial_distortion, kWidth, kHeight, 0, 0});
+    return LensCurve::of({kFocalLength, 1, {lens_.radial_distortion}, kWidth, kHeight, 0, 0});
   }
   [[nodiscard]] std::optional<Eigen::Vector2d> project(const Eigen::Matrix3d& base_from_camera,
                                                        const Eigen::Vector3d& d) const {

@@ -171,7 +171,7 @@ TEST(Localizer, DoesNotBelieveOneOfTwoPlacesThatLookAlike) {
 
 TEST(Localizer, OfAnEmptyMapFindsNothing) {
   SceneMap map;
-  map.lens = LensCurve::of({1500, 1, 0, 1280, 720});
+  map.lens = LensCurve::of({1500, 1, {0}, 1280, 720});
   PicturedScene scene = scene_of(1);
   EXPECT_EQ(Localizer(map).find(scene.features(picture_at(0, 0, 1500), kFeatureNoise_px)).status,
             LocalizationStatus::kNotInMap);

@@ -101,7 +101,7 @@ TEST(MapProjection, ItsJacobiansAreTheNumericOnes) {
             Camera<double> with = camera;
             with.focal_length += off[0];
             with.aspect += off[1];
-            with.radial_distortion += off[2];
+            with.distortion.radial += off[2];
             with.centre_u += off[3];
             with.centre_v += off[4];
             return seen(with, R, u.y(), d);

@@ -18,7 +18,7 @@ constexpr double kNow = 1.7e9;
 class UpkeepTest : public ::testing::Test {
  protected:
   UpkeepTest() {
-    map.lens = LensCurve::of({kFocalLength, 1, 0, 1280, 720, 0, 0});
+    map.lens = LensCurve::of({kFocalLength, 1, {0}, 1280, 720, 0, 0});
     map.reference_row = 360;
     for (int i = 0; i < 24; ++i) {
       SceneLandmark landmark = landmark_at({200.0 + 160 * (i % 6), 120.0 + 160 * (i / 6)}, i);

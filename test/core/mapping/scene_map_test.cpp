@@ -32,7 +32,7 @@ TEST(SceneMap, ALensIsTheSameOfItsKnotsAndControlPoints) {
   for (double s = 6.9; s < 9.5; s += 0.0137) {
     const Camera<double> a = lens.camera_at(s, 1e-3), b = again.camera_at(s, 1e-3);
     EXPECT_EQ(a.focal_length, b.focal_length);
-    EXPECT_EQ(a.radial_distortion, b.radial_distortion);
+    EXPECT_EQ(a.distortion.radial, b.distortion.radial);
     EXPECT_EQ(a.centre_u, b.centre_u);
     EXPECT_EQ(a.aspect, b.aspect);
   }

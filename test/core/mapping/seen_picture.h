@@ -38,7 +38,7 @@ struct SeenPicture {
     simulator::Lens out;
     out.focal_length = focal_length * std::exp(zoom_rate * time);
     const double per_corner = out.focal_length / (std::hypot(width, height) / 2);
-    out.radial_distortion = corner_distortion * per_corner * per_corner;
+    out.distortion.radial = corner_distortion * per_corner * per_corner;
     out.centre = Eigen::Vector2d(width, height) / 2 + centre_offset;
     return out;
   }
@@ -65,8 +65,13 @@ struct SeenPicture {
   [[nodiscard]] PoseKnowledge knowledge(bool with_mount) const {
     PoseKnowledge out;
     const simulator::Lens at = lens(0);
-    out.lens = LensCurve::of({at.focal_length, 1, at.radial_distortion, width, height,
-                              centre_offset.x(), centre_offset.y()});
+    out.lens = LensCurve::of({at.focal_length,
+                              1,
+                              {at.distortion.radial},
+                              width,
+                              height,
+                              centre_offset.x(),
+                              centre_offset.y()});
     out.motion.line_delay = line_delay;
     out.motion.reference_row = reference_row;
     out.motion.zoom_rate = zoom_rate;

@@ -117,7 +117,7 @@ TEST(Jet, CameraJacobiansAreTheDerivatives) {
       Camera<Jet<8>> camera_jet = camera.cast<Jet<8>>();
       camera_jet.focal_length.v[3] = 1;
       camera_jet.aspect.v[4] = 1;
-      camera_jet.radial_distortion.v[5] = 1;
+      camera_jet.distortion.radial.v[5] = 1;
       camera_jet.centre_u.v[6] = 1;
       camera_jet.centre_v.v[7] = 1;
 
@@ -210,7 +210,7 @@ RollingJets rolling_jets(const Camera<double>& camera, const Mechanics<double>& 
   jets.motion.rate.tilt.v[5] = 1;
   jets.camera.focal_length.v[slot(Parameter::kFocalLength)] = 1;
   jets.camera.aspect.v[slot(Parameter::kAspect)] = 1;
-  jets.camera.radial_distortion.v[slot(Parameter::kRadialDistortion)] = 1;
+  jets.camera.distortion.radial.v[slot(Parameter::kRadialDistortion)] = 1;
   jets.camera.centre_u.v[slot(Parameter::kCentreU)] = 1;
   jets.camera.centre_v.v[slot(Parameter::kCentreV)] = 1;
   jets.mechanics.pan_axis = direction_plus(

@@ -148,7 +148,7 @@ TEST(RollingShutter, MountAtRestSeesAsAGlobalShutter) {
 TEST(RollingShutter, RowIsSeenFromTheOrientationAtItsTime) {
   // Panning right at 1 rad/s with 10 us a row: 500 rows below the reference row, 5 ms later.
   Setting setting;
-  setting.camera = {1000, 1, 0, 1280, 720};
+  setting.camera = {1000, 1, {0}, 1280, 720};
   setting.motion = {{0.2, 0}, {1, 0}, 100};
   setting.line_delay = 10e-6;
   Vec3 d;
@@ -289,7 +289,7 @@ TEST(RollingShutter, PassesOnTheCamerasRefusals) {
   };
   EXPECT_EQ(project_status(setting, {-1, 0, 0}), ProjectionStatus::kBehindCamera);
   Setting barrel = setting;
-  barrel.camera.radial_distortion = -55.4;
+  barrel.camera.distortion.radial = -55.4;
   EXPECT_EQ(project_status(barrel, Vec3(1, 0.8, 0).normalized()),
             ProjectionStatus::kBeyondDistortionLimit);
   EXPECT_EQ(unproject_status(barrel, {5000, 540}), ProjectionStatus::kBeyondDistortionLimit);

@@ -30,7 +30,7 @@ TEST(LensCamera, IsTheSameCameraWhereOneParameterIsEnough) {
   ASSERT_TRUE(nearest);
   EXPECT_NEAR(nearest->camera.focal_length, 900, 1e-6);
   EXPECT_NEAR(nearest->camera.aspect, 1.02, 1e-9);
-  EXPECT_NEAR(nearest->camera.radial_distortion, -0.15, 1e-9);
+  EXPECT_NEAR(nearest->camera.distortion.radial, -0.15, 1e-9);
   EXPECT_EQ(nearest->camera.width, 1280);
   EXPECT_EQ(nearest->line_delay, -14e-6);
   EXPECT_LT(nearest->misfit_px, 1e-6);
@@ -76,7 +76,7 @@ TEST(LensCamera, ErrorsOfTheLensAreErrorsOfTheCamera) {
     const Vector3<double> error(
         after->camera.focal_length - nearest->camera.focal_length,
         after->camera.aspect - nearest->camera.aspect,
-        after->camera.radial_distortion - nearest->camera.radial_distortion);
+        after->camera.distortion.radial - nearest->camera.distortion.radial);
     sum += error.dot(own.ldlt().solve(error));
   }
   // 99.99 % of chi-square with 90 degrees of freedom lie in (46, 149).
@@ -110,7 +110,7 @@ TEST(LensCamera, LandmarksSomewhereInTheImageSeeACameraWithinThreeSigmas) {
     const Eigen::Vector2d fit = H.ldlt().solve(g);
     EXPECT_LT(std::abs(fit[0] - nearest->camera.focal_length),
               3 * std::sqrt(nearest->covariance(0, 0)));
-    EXPECT_LT(std::abs(fit[1] / fit[0] - nearest->camera.radial_distortion),
+    EXPECT_LT(std::abs(fit[1] / fit[0] - nearest->camera.distortion.radial),
               3 * std::sqrt(nearest->covariance(2, 2)));
   }
 }

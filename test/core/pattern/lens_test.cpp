@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "core/model/camera.h"
+#include "core/model/lens/camera.h"
 #include "test/support/not_a_number.h"
 #include "test/support/numeric_jacobian.h"
 
@@ -54,7 +54,7 @@ TEST(Lens, WithoutTangentialTermsIsTheCameraOfTheModel) {
   LensVector lens = lens_with(0.1, 0, 0, 0);
   lens[index(LensParameter::kCentreU)] = 320;
   lens[index(LensParameter::kCentreV)] = 240;
-  const Camera<double> camera{600, 610.0 / 600, 0.1, 640, 480};
+  const Camera<double> camera{600, 610.0 / 600, {0.1}, 640, 480};
   for (const Vector3<double>& p : points()) {
     Vector2<double> u;
     Vector2<double> of_camera;

@@ -16,7 +16,7 @@ namespace {
 
 Calibration paper_calibration() {
   Calibration calibration;
-  calibration.camera = {32008, 1, 55.4, 1920, 1080};
+  calibration.camera = {32008, 1, {55.4}, 1920, 1080};
   calibration.line_delay = -14.2e-6;
   calibration.mechanics.pan_axis = Vector3<double>(0.012, 0.003, 1).normalized();
   calibration.mechanics.tilt_axis = Vector3<double>(-0.004, 1, 0.014).normalized();
@@ -51,7 +51,7 @@ TEST(FrameOrientation, MapsEveryPixelAsTheSlowForwardModelDoes) {
           1e-10 * MotionCovariance::Identity(), Sensitivity<6>::Zero(), &frame));
       const test::TrueCamera truth{named.camera.focal_length,
                                    named.camera.aspect,
-                                   named.camera.radial_distortion,
+                                   named.camera.distortion.radial,
                                    named.camera.width,
                                    named.camera.height,
                                    line_delay,
@@ -246,7 +246,7 @@ TEST(FrameOrientation, HasNoDirectionsWithoutAnOrientation) {
 
 TEST(FrameOrientation, SaysWhyAPixelOrDirectionHasNone) {
   Calibration calibration = paper_calibration();
-  calibration.camera = {900, 1, -0.3, 1920, 1080};
+  calibration.camera = {900, 1, {-0.3}, 1920, 1080};
   const FrameOrientation frame = orientation(calibration, {0, 0}, {0, 0});
   Vector3<double> d_b;
   EXPECT_EQ(frame.direction({1919, 1}, &d_b), ProjectionStatus::kBeyondDistortionLimit);

@@ -22,7 +22,7 @@ namespace {
 
 struct Case {
   std::string name;
-  Camera<double> camera{32008, 1, 55.4, 1920, 1080};
+  Camera<double> camera{32008, 1, {55.4}, 1920, 1080};
   double line_delay = -14.2e-6;
   double clock_offset = -84.4e-3;
   double pan_scale = 1;
@@ -88,7 +88,7 @@ TEST_P(PtModeErrors, AreWhatTheCovarianceSays) {
     const test::TrueCamera camera{
         c.camera.focal_length + x[0],
         c.camera.aspect + x[1],
-        c.camera.radial_distortion + x[2],
+        c.camera.distortion.radial + x[2],
         c.camera.width,
         c.camera.height,
         c.line_delay + x[index(Parameter::kLineDelay)],
@@ -201,7 +201,7 @@ INSTANTIATE_TEST_SUITE_P(
                     with("LargeNegativeLineDelay", [](Case& c) { c.line_delay = -30e-6; }),
                     with("WideAngleWithBarrelDistortion",
                          [](Case& c) {
-                           c.camera = {1200, 1.02, -0.12, 1920, 1080};
+                           c.camera = {1200, 1.02, {-0.12}, 1920, 1080};
                            c.line_delay = 30e-6;
                            c.angle_sigma = 3e-4;
                          }),
@@ -240,7 +240,7 @@ INSTANTIATE_TEST_SUITE_P(
 
 Calibration simple_calibration(double line_delay) {
   Calibration calibration;
-  calibration.camera = {1000, 1, 0, 640, 480};
+  calibration.camera = {1000, 1, {0}, 640, 480};
   calibration.line_delay = line_delay;
   calibration.clock_offset = 0.25;
   return calibration;

@@ -39,7 +39,7 @@ TEST(RealtimeAllocation, PushingAndLookingUpTelemetryAllocatesNothing) {
 
 TEST(RealtimeAllocation, PtModeAllocatesNothing) {
   Calibration calibration;
-  calibration.camera = {32008, 1, 55.4, 1920, 1080};
+  calibration.camera = {32008, 1, {55.4}, 1920, 1080};
   calibration.line_delay = -14.2e-6;
   calibration.covariance.diagonal().setConstant(1e-12);
   TelemetryBuffer<64> buffer;
@@ -147,7 +147,7 @@ TEST(RealtimeAllocation, OeModeAllocatesNothing) {
   constexpr double kFocalLength = 20000;  // px
   constexpr double kRadius = 8;           // px
   Calibration calibration;
-  calibration.camera = {kFocalLength, 1, 0, kWidth, kHeight};
+  calibration.camera = {kFocalLength, 1, {0}, kWidth, kHeight};
   calibration.line_delay = 20e-6;
   std::mt19937_64 random(2);
   const AnalyticImage texture(&random, 8);

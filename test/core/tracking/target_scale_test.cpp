@@ -31,7 +31,7 @@ TEST(TargetScale, RollingShutterIsNegligible) {
   int seen = 0;
   for (const double focal_length : {1200.0, 4000.0, 20000.0}) {
     Calibration calibration = watching_calibration(focal_length);
-    calibration.camera.radial_distortion = 0;
+    calibration.camera.distortion.radial = 0;
     calibration.line_delay = 0.03 / 1080;
     const double half_view = std::atan(960 / focal_length);
     // The horizon is above the picture.

@@ -101,12 +101,12 @@ void expect_near_truth(const Calibration& calibration) {
     EXPECT_LT(std::abs(value - truth), 6 * sigma) << to_string(parameter);
   };
   expect_near(Parameter::kFocalLength, calibration.camera.focal_length, kFocalLength);
-  expect_near(Parameter::kRadialDistortion, calibration.camera.radial_distortion, kDistortion);
+  expect_near(Parameter::kRadialDistortion, calibration.camera.distortion.radial, kDistortion);
   expect_near(Parameter::kLineDelay, calibration.line_delay, kLineDelay);
   expect_near(Parameter::kClockOffset, calibration.clock_offset, kClockOffset);
   // Whatever the sigmas say.
   EXPECT_NEAR(calibration.camera.focal_length, kFocalLength, 1e-3 * kFocalLength);
-  EXPECT_NEAR(calibration.camera.radial_distortion, kDistortion, 0.01 * kDistortion);
+  EXPECT_NEAR(calibration.camera.distortion.radial, kDistortion, 0.01 * kDistortion);
   EXPECT_NEAR(calibration.line_delay, kLineDelay, 0.5e-6);
 }
 

@@ -113,7 +113,7 @@ class CheckCommand : public ::testing::Test {
     for (const double reading : {1000.0, 1250.0, 1500.0, 1750.0, 2000.0}) {
       Calibration c = test::zoom_calibration(reading);
       const double scale = 900 / test::zoom_focal_length(1625);
-      c.camera = {scale * c.camera.focal_length, 1, 0, 320, 180, 0, 0};
+      c.camera = {scale * c.camera.focal_length, 1, {0}, 320, 180, 0, 0};
       const int f = index(Parameter::kFocalLength);
       c.covariance(f, f) *= scale * scale;
       c.line_delay = 75e-6;

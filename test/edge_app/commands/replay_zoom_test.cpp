@@ -78,7 +78,7 @@ class ReplayZoom : public ::testing::Test {
       Calibration node;
       node.zoom = reading_of(f);
       const simulator::Lens lens = zoom.nominal_lens(*node.zoom);
-      node.camera = {lens.focal_length, 1, lens.radial_distortion, 480, 270, 0, 0};
+      node.camera = {lens.focal_length, 1, {lens.radial_distortion}, 480, 270, 0, 0};
       node.line_delay = config_->camera.line_delay;
       node.clock_offset = config_->camera.clock_offset;
       const auto set = [&node](Parameter p, double sigma) {

@@ -92,7 +92,7 @@ TEST(PlaneData, IsReadAsItIsMeant) {
 // The direction of a pixel is that of the frame whose record it was, at its own row's time.
 TEST(PlaneData, APixelOfARecordIsTheFramesDirection) {
   Calibration calibration;
-  calibration.camera = {2000, 1, -0.1, 1920, 1080, 3, -2};
+  calibration.camera = {2000, 1, {-0.1}, 1920, 1080, 3, -2};
   calibration.line_delay = 2e-5;
   FrameMotion<double> motion;
   motion.angle = {0.3, -0.2};

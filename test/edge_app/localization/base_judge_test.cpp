@@ -22,7 +22,7 @@ constexpr double kReferenceRow = 100;
 OrientationRecord record_at(const PanTilt<double>& angle) {
   FrameOrientation frame;
   Calibration calibration;
-  calibration.camera = {1500, 1, 0, 640, 360};
+  calibration.camera = {1500, 1, {0}, 640, 360};
   calibration.line_delay = 2e-5;
   calibration.mechanics.tilt_axis = Vector3<double>(0.01, 1, 0.02).normalized();
   MotionCovariance covariance = MotionCovariance::Zero();

@@ -21,7 +21,7 @@ constexpr double kNow_utc_s = 1.7e9;
 class SceneUpkeepTest : public testing::Test {
  protected:
   SceneUpkeepTest() {
-    const Camera<double> camera{kFocalLength, 1, 0, 1280, 720, 0, 0};
+    const Camera<double> camera{kFocalLength, 1, {0}, 1280, 720, 0, 0};
     map_.lens = LensCurve::of(camera);
     map_.reference_row = 360;
     found_.status = LocalizationStatus::kOk;

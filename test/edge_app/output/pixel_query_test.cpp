@@ -25,7 +25,7 @@ constexpr double kTime = 1234.5;
 
 Calibration calibration() {
   Calibration out;
-  out.camera = {2667.5, 1.001, 13.9, 1280, 720};
+  out.camera = {2667.5, 1.001, {13.9}, 1280, 720};
   out.line_delay = -30e-6;
   out.mechanics.pan_axis = Vector3<double>(0.012, 0.003, 1).normalized();
   out.mechanics.tilt_axis = Vector3<double>(-0.004, 1, 0.014).normalized();

@@ -203,7 +203,7 @@ class Scene {
 
 OrientationStepOptions options_with_images() {
   OrientationStepOptions options;
-  options.calibration.camera = {2000, 1, 0, Scene::kWidth, Scene::kHeight};
+  options.calibration.camera = {2000, 1, {0}, Scene::kWidth, Scene::kHeight};
   options.oe.emplace();
   options.oe->maker.cell_size_px = 20;
   options.follow_points = true;

@@ -394,7 +394,7 @@ TEST(SelfCalibration, FindsTelemetryThatComesLaterThanTheVideo) {
 TEST(SelfCalibration, SaysThatTelemetryComesTooLateAlsoWhereThereIsACalibration) {
   MemoryArchive archive;
   StoredCalibration stored;
-  stored.calibration.camera = {5000, 1, 0, 1920, 1080};
+  stored.calibration.camera = {5000, 1, {0}, 1920, 1080};
   archive.stored_.push_back(stored);
   SelfCalibration calibration(options_for(camera()), &archive);
   FrameTracks frame;
@@ -466,7 +466,7 @@ TEST(SelfCalibration, KeepsOneCalibrationForEachZoom) {
 TEST(SelfCalibration, BeginsWithWhatIsStored) {
   MemoryArchive archive;
   StoredCalibration stored;
-  stored.calibration.camera = {5000, 1, 0, 1920, 1080};
+  stored.calibration.camera = {5000, 1, {0}, 1920, 1080};
   stored.path = "/somewhere/calibration.yaml";
   archive.stored_.push_back(stored);
   SelfCalibration calibration(options_for(camera()), &archive);

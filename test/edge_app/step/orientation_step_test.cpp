@@ -1014,7 +1014,7 @@ TEST(FrameTracks, AnObservationsSigmaIsThatOfAComponentAndOutliersHaveNone) {
 
 TEST(OrientationStep, RefusesOptionsOfOeModeThatAreNotValid) {
   OrientationStepOptions options;
-  options.calibration.camera = {2000, 1, 0, 640, 480};
+  options.calibration.camera = {2000, 1, {0}, 640, 480};
   options.oe = oe_options(options.calibration.camera);
   EXPECT_NO_THROW(OrientationStep{options});
   options.oe->search.choice.max_chosen = 0;

@@ -109,7 +109,7 @@ TEST_F(RepeatedImagesTest, WhereNotAllComeEquallyOftenTheyAreLateByUpToAnInterva
 
 TEST(OrientationStep, LeavesOutAnImageThatIsSentAgainAndSaysSo) {
   OrientationStepOptions options;
-  options.calibration.camera = {4000, 1, 0, kColumns, kRows};
+  options.calibration.camera = {4000, 1, {0}, kColumns, kRows};
   options.oe = OeOptions();
   options.follow_points = true;
   OrientationStep step(options);

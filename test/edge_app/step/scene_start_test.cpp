@@ -49,7 +49,7 @@ TEST_P(SceneStartAtPace, SaysWhatAMotorsAccelerationLeavesUnknown) {
   constexpr int kTrials = 200;
   constexpr double kToldSigma = 3e-4;  // rad, far above what following adds
   Calibration calibration;
-  calibration.camera = {8000, 1, 0, 1280, 720};
+  calibration.camera = {8000, 1, {0}, 1280, 720};
   const double field = 2 * std::atan(640.0 / 8000);
   const double motor = 10 * field;  // rad/s^2, as MotionPredictionOptions::acceleration_fields
   std::mt19937_64 random(7);

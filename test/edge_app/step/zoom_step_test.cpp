@@ -241,8 +241,8 @@ TEST(ZoomLookup, TellsHowDistortionAndCentreGoOnAlongTheCurve) {
   for (const double zoom : {1000.0, 1250.0, 1500.0, 1750.0, 2000.0}) {
     Calibration node = test::zoom_calibration(zoom);
     Camera<double>& camera = node.camera;
-    camera.radial_distortion =
-        camera.distortion_of_corner() * (0.03 * std::log(camera.focal_length) - 0.25);
+    camera.distortion.radial =
+        corner_unit(camera)[0] * (0.03 * std::log(camera.focal_length) - 0.25);
     camera.set_centre_offset({0.01 * zoom, 1e-5 * zoom * zoom});
     nodes.push_back(node);
   }
@@ -250,9 +250,7 @@ TEST(ZoomLookup, TellsHowDistortionAndCentreGoOnAlongTheCurve) {
   std::string error;
   ASSERT_TRUE(fit_zoom(nodes, {}, &fit, &error)) << error;
   const ZoomCurve& curve = fit.curve;
-  const auto corner = [](const Camera<double>& camera) {
-    return camera.radial_distortion / camera.distortion_of_corner();
-  };
+  const auto corner = [](const Camera<double>& camera) { return corner_distortion(camera)[0]; };
   for (const double zoom : {1000.0, 1550.0, 2000.0}) {
     ZoomLookup lookup;
     lookup.add(0, zoom);

@@ -19,7 +19,7 @@ using ::testing::StartsWith;
 
 Calibration some_calibration() {
   Calibration calibration;
-  calibration.camera = {32008 + 1 / 3.0, 1, 55.4, 1920, 1080};
+  calibration.camera = {32008 + 1 / 3.0, 1, {55.4}, 1920, 1080};
   calibration.line_delay = -14.2e-6;
   calibration.mechanics.pan_axis = Vector3<double>(-0.012, 0.001, 1).normalized();
   calibration.mechanics.tilt_axis = Vector3<double>(0.002, 1, 0.014).normalized();

@@ -37,7 +37,7 @@ constexpr int kHeight = 480;
 // Told apart by its focal length; its map by the number of landmarks.
 StoredCalibration some(double focal_length, std::optional<double> zoom = {}, int landmarks = 3) {
   StoredCalibration out;
-  out.calibration.camera = {focal_length, 1, 0, kWidth, kHeight};
+  out.calibration.camera = {focal_length, 1, {0}, kWidth, kHeight};
   out.calibration.zoom = zoom;
   for (int i = 0; i < landmarks; ++i) {
     Landmark landmark;

@@ -29,7 +29,7 @@ constexpr std::size_t kLandmarks = 24;  // likewise
 
 Calibration map_calibration() {
   Calibration calibration;
-  calibration.camera = {4000 + 1 / 3.0, 1, -0.3, 1920, 1080};
+  calibration.camera = {4000 + 1 / 3.0, 1, {-0.3}, 1920, 1080};
   calibration.line_delay = 1e-6 / 3;
   calibration.mechanics.pan_axis = Vector3<double>(0.02, -0.01, 1).normalized();
   calibration.clock_offset = -0.1 / 3;

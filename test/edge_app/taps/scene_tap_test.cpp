@@ -155,7 +155,7 @@ TEST(SceneTap, TiesTheRecordsOfTheRealTimeThread) {
   ScriptedLocator locator({});
   SceneTap tap(locator, {1000, 1});
   OrientationStepOptions options;
-  options.calibration.camera = {100, 1, 0, kWidth, kHeight};
+  options.calibration.camera = {100, 1, {0}, kWidth, kHeight};
   options.calibrated = true;
   options.oe = oe_options(options.calibration.camera);
   RealtimeStage stage(options, false, false, nullptr, &tap);

@@ -86,7 +86,7 @@ TEST(FrameView, ItsCovarianceIsThatOfThePixelAndOfTheMotionAlone) {
 TEST(FrameView, WhateverTheLensThePictureLiesInItsRegion) {
   for (const double k : {-0.1, -0.05, 0.0, 0.3}) {
     Calibration calibration = test::watching_calibration(900);
-    calibration.camera.radial_distortion = k;
+    calibration.camera.distortion.radial = k;
     const FrameView view(record_of(1, test::watching_frame(calibration, -1, 0.1)));
     ASSERT_EQ(view.region().count, k > -0.1 ? 4 : 0);
     const Matrix2<double> exact = 1e-6 * Matrix2<double>::Identity();
@@ -112,7 +112,7 @@ TEST(FrameView, WhateverTheLensThePictureLiesInItsRegion) {
 
 TEST(FrameView, APixelThatTheLensHasNoDirectionForHasNoPlace) {
   Calibration calibration = test::watching_calibration(600);
-  calibration.camera.radial_distortion = -0.2;
+  calibration.camera.distortion.radial = -0.2;
   const FrameView view(record_of(1, test::watching_frame(calibration, 0, 0)));
   EXPECT_FALSE(view.measure({1, 1}, 1));
   EXPECT_TRUE(view.measure({960, 540}, 1));

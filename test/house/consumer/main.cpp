@@ -8,7 +8,7 @@
 
 int main() {
   alidade::Calibration calibration;
-  calibration.camera = {1500.0, 1.0, 0.0, 1280, 720};
+  calibration.camera = {1500.0, 1.0, {0.0}, 1280, 720};
   alidade::TelemetryBuffer<64> telemetry;
   for (int i = 0; i < 10; ++i) {
     const double time_s = 0.1 * i;

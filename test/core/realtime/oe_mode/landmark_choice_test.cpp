@@ -52,7 +52,7 @@ class ChosenLandmarks : public testing::Test {
     return options;
   }
 
-  Camera<double> camera_{1000, 1, 0, kWidth, kHeight};
+  Camera<double> camera_{1000, 1, {0}, kWidth, kHeight};
   LandmarkMap map_{2000, 4e-4};
   Octaves octaves_{OctaveOptions{}};
   std::vector<VisibleLandmark> visible_;

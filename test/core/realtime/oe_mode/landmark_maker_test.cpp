@@ -167,7 +167,7 @@ TEST_F(MadeLandmarks, ShareWhatTheFrameDoesNotKnow) {
             frame.motion.angle.tilt + x[1] + t * (frame.motion.rate.tilt + x[3]));
       };
       return true_direction(
-          {camera.focal_length, camera.aspect, camera.radial_distortion, camera.width,
+          {camera.focal_length, camera.aspect, camera.distortion.radial, camera.width,
            camera.height, changed.line_delay, changed.mechanics.pan_axis,
            changed.mechanics.tilt_axis, camera.centre_offset()},
           path, -frame.motion.reference_row * changed.line_delay, u);

@@ -20,14 +20,14 @@ constexpr double kMapFocalLength = 2000;  // px
 
 Calibration curve_at(double focal_length) {
   Calibration out;
-  out.camera = {focal_length, 1, 0, 1280, 720, 3, -2};
-  out.camera.radial_distortion = -0.02 * std::pow(focal_length / std::hypot(640, 360), 2);
+  out.camera = {focal_length, 1, {0}, 1280, 720, 3, -2};
+  out.camera.distortion.radial = -0.02 * std::pow(focal_length / std::hypot(640, 360), 2);
   out.line_delay = 30e-6;
   const auto set = [&out](Parameter p, double sigma) {
     out.covariance(index(p), index(p)) = sigma * sigma;
   };
   set(Parameter::kFocalLength, kRepeatability * focal_length);
-  set(Parameter::kRadialDistortion, 0.02 * std::abs(out.camera.radial_distortion));
+  set(Parameter::kRadialDistortion, 0.02 * std::abs(out.camera.distortion.radial));
   set(Parameter::kCentreU, 0.2);
   set(Parameter::kCentreV, 0.2);
   return out;
@@ -43,7 +43,7 @@ FrameLens told(double focal_length, bool moves = false, double rate = 0) {
 }
 
 double corner(const Camera<double>& camera) {
-  return camera.radial_distortion / std::pow(camera.focal_length, 2);
+  return camera.distortion.radial / std::pow(camera.focal_length, 2);
 }
 
 double log_variance(const Calibration& calibration) {
@@ -184,8 +184,7 @@ TEST_F(FollowedLens, HasDistortionAndCentreOfTheFocalLengthThatIsSeen) {
     const double log_f = told_log_f - scale_.value + change;
     const Camera<double> camera = follower_.with_focal_length(log_f, scale_, camera_);
     EXPECT_NEAR(std::log(camera.focal_length), log_f, 1e-12);
-    EXPECT_NEAR(camera.radial_distortion / camera.distortion_of_corner(),
-                of_reading.radial_distortion / of_reading.distortion_of_corner() + 0.05 * followed,
+    EXPECT_NEAR(corner_distortion(camera)[0], corner_distortion(of_reading)[0] + 0.05 * followed,
                 1e-12);
     EXPECT_NEAR(camera.centre_u, of_reading.centre_u + 4 * followed, 1e-12);
     EXPECT_NEAR(camera.centre_v, of_reading.centre_v - 2 * followed, 1e-12);
@@ -320,7 +319,7 @@ TEST_F(FollowedLens, DoubtsDistortionAndCentreAsTheCurveDidWhereLandmarksWereMad
     const Calibration& sharp = reading.calibration;
     const ParameterCovariance<double> of_curve = sharp.covariance;
     if (vague) {
-      const double of_corner = sharp.camera.distortion_of_corner();
+      const double of_corner = corner_unit(sharp.camera)[0];
       const int of_k = index(Parameter::kRadialDistortion);
       reading.calibration.covariance(of_k, of_k) += std::pow(kUnknown * of_corner, 2);
       const int of_u = index(Parameter::kCentreU);
@@ -343,7 +342,7 @@ TEST_F(FollowedLens, DoubtsDistortionAndCentreAsTheCurveDidWhereLandmarksWereMad
   EXPECT_NEAR(more(Parameter::kCentreU), kUnknown_px, 0.01 * kUnknown_px);
   EXPECT_EQ(vague.covariance(index(Parameter::kCentreV), index(Parameter::kCentreV)),
             sharp.covariance(index(Parameter::kCentreV), index(Parameter::kCentreV)));
-  const double of_corner = sharp.camera.distortion_of_corner();
+  const double of_corner = corner_unit(sharp.camera)[0];
   EXPECT_NEAR(more(Parameter::kRadialDistortion) / of_corner, kUnknown, 0.02 * kUnknown);
   EXPECT_NEAR(std::sqrt(log_variance(vague) - log_variance(sharp)),
               std::hypot(kUnknown, kByCentre * kUnknown_px), 0.02 * kUnknown);

@@ -33,7 +33,7 @@ class Draws {
   // Of parameters in their units, all correlated; the aspect is exact.
   Calibration calibration(double log_sigma) {
     Calibration out;
-    out.camera = {kFocal, 1, 0.3, 1280, 720};
+    out.camera = {kFocal, 1, {0.3}, 1280, 720};
     ParameterDirection sigma = ParameterDirection::Constant(1e-4);
     sigma[kF] = log_sigma * kFocal;
     sigma[index(Parameter::kAspect)] = 0;
@@ -93,18 +93,18 @@ TEST(LensScale, MovesTheDistortionAlongUnlessThatIsExact) {
   lens.move_calibration(0.01, &moved);
   EXPECT_DOUBLE_EQ(lens.value, -0.01);
   EXPECT_NEAR(moved.camera.focal_length, kFocal * std::exp(0.01), 1e-9);
-  EXPECT_NEAR(moved.camera.radial_distortion, 0.3 * std::exp(0.02), 1e-12);
+  EXPECT_NEAR(moved.camera.distortion.radial, 0.3 * std::exp(0.02), 1e-12);
   // Back by its value.
   const Calibration back = lens.at_value(moved);
   EXPECT_NEAR(back.camera.focal_length, kFocal, 1e-9);
-  EXPECT_NEAR(back.camera.radial_distortion, 0.3, 1e-12);
+  EXPECT_NEAR(back.camera.distortion.radial, 0.3, 1e-12);
 
   calibration.covariance.row(kK).setZero();
   calibration.covariance.col(kK).setZero();
   lens = LensScale::begin(calibration);
   moved = calibration;
   lens.move_calibration(0.01, &moved);
-  EXPECT_EQ(moved.camera.radial_distortion, 0.3);
+  EXPECT_EQ(moved.camera.distortion.radial, 0.3);
 }
 
 // Offset, phi and what both depend on are drawn; telemetry at many pans and the landmarks' scale tell them.
@@ -170,7 +170,7 @@ TEST(LensColumns, AreOfTheSameChangesForEveryLens) {
   const LensScale lens = LensScale::begin(calibration);
   Camera<double> other = calibration.camera;
   other.focal_length *= 7;
-  other.radial_distortion = -11;
+  other.distortion.radial = -11;
   const LensColumns columns(lens, other);
   Vector2<double> u;
   Matrix<double, 2, kCameraParameterCount> J;
@@ -187,7 +187,7 @@ TEST(LensColumns, AreOfTheSameChangesForEveryLens) {
     Camera<double> camera = other;
     const double factor = std::exp(change);
     camera.focal_length *= factor;
-    camera.radial_distortion = (camera.radial_distortion + corner) * factor * factor;
+    camera.distortion.radial = (camera.distortion.radial + corner) * factor * factor;
     Vector2<double> out;
     EXPECT_EQ(project(camera, d, &out), ProjectionStatus::kOk);
     return out;

@@ -45,8 +45,8 @@ class LensFrame {
  public:
   LensFrame(const LensWorld& world, std::uint64_t seed) : random_(seed) {
     Calibration calibration;
-    calibration.camera = {kLensFocal, 1, -0.2, static_cast<int>(kLensWidth),
-                          static_cast<int>(kLensHeight)};
+    calibration.camera = {
+        kLensFocal, 1, {-0.2}, static_cast<int>(kLensWidth), static_cast<int>(kLensHeight)};
     calibration.line_delay = kLineDelay;
     calibration.covariance(kRowOfF, kRowOfF) = std::pow(kLensFocal * world.sigma, 2);
     lens_ = LensScale::begin(calibration);

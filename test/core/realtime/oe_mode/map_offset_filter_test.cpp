@@ -18,7 +18,7 @@ constexpr double kTelemetrySigma = 1e-4;  // rad, of one answer
 
 Calibration any_calibration() {
   Calibration calibration;
-  calibration.camera = {1500, 1, 0, 480, 270};
+  calibration.camera = {1500, 1, {0}, 480, 270};
   return calibration;
 }
 

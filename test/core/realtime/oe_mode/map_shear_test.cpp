@@ -18,7 +18,7 @@ constexpr double kShearPeriod_s = 0.04;
 
 Calibration sheared_calibration() {
   Calibration calibration;
-  calibration.camera = {1500, 1, 0, 480, 270};
+  calibration.camera = {1500, 1, {0}, 480, 270};
   calibration.line_delay = 50e-6;
   return calibration;
 }

@@ -15,7 +15,7 @@ namespace {
 
 Calibration scaled_calibration() {
   Calibration out;
-  out.camera = {1500, 1, 0, 480, 270};
+  out.camera = {1500, 1, {0}, 480, 270};
   out.line_delay = 50e-6;
   out.mechanics.pan_scale = 1.01;
   out.mechanics.tilt_scale = 0.98;

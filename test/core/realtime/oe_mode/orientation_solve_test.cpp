@@ -69,8 +69,8 @@ class Simulation {
   // Positions all over the image, Jacobians of a camera at a tilt, covariances of all shapes.
   [[nodiscard]] FoundLandmark landmark(const World& world, const Vector2<double>& u) {
     Calibration calibration;
-    calibration.camera = {kSolvedFocal, 1, 0.5, static_cast<int>(kSolvedWidth),
-                          static_cast<int>(kSolvedHeight)};
+    calibration.camera = {
+        kSolvedFocal, 1, {0.5}, static_cast<int>(kSolvedWidth), static_cast<int>(kSolvedHeight)};
     calibration.line_delay = world.line_delay;
     const FrameMotion<double> motion{{0.3, -0.4}, {0.1, 0.05}, kSolvedHeight / 2};
     Vector3<double> d;

@@ -29,7 +29,7 @@ class TexturedScene {
   static constexpr double kPixel = 1 / kFocalLength;  // rad
 
   TexturedScene() {
-    calibration_.camera = {kFocalLength, 1, 0, kWidth, kHeight};
+    calibration_.camera = {kFocalLength, 1, {0}, kWidth, kHeight};
     octaves_.reset(kHeight);
     octaves_.set_noise(kNoise);
     map_.clear(kCell_px * kPixel, 3 * kCell_px * kPixel);

@@ -156,7 +156,7 @@ TEST(ViewProjection, LeavesOutNoMoreThanTheThirdPowerOfTheTurn) {
 // The header's example.
 TEST(ViewProjection, IsOffByLessThanAThousandthOfAPixelAtAFieldOfViewASecond) {
   View view;
-  view.calibration.camera = {1663, 1, 0, 1920, 1080};
+  view.calibration.camera = {1663, 1, {0}, 1920, 1080};
   view.calibration.line_delay = 25e-6;
   view.motion = {{0, 0}, {kPi / 3, 0}, 540};
   const ViewProjection projection(view.calibration, view.motion);
@@ -312,7 +312,7 @@ TEST(ViewProjection, RoughlyIsWithinAPixelAtHalfAFieldOfViewASecond) {
 // direction is seen on its own row lie the wrong way from the middle. The other way it meets them, once.
 TEST(ViewProjection, HasNoPixelWhereTheImageOutrunsTheReadOut) {
   View view;
-  view.calibration.camera = {3000, 1, 0, 640, 480};
+  view.calibration.camera = {3000, 1, {0}, 640, 480};
   view.calibration.line_delay = 50e-6;
   int outrun = 0;
   for (const double rate : {-10.0, 10.0}) {

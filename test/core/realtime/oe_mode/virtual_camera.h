@@ -77,7 +77,7 @@ class VirtualCamera {
   VirtualCamera(const simulator::Config& config, std::shared_ptr<Film> film)
       : film_(std::move(film)) {
     const simulator::CameraConfig& c = config.camera;
-    calibration_.camera = {c.focal_length, c.aspect, c.radial_distortion, kWidth, kHeight};
+    calibration_.camera = {c.focal_length, c.aspect, {c.radial_distortion}, kWidth, kHeight};
     calibration_.line_delay = c.line_delay;
   }
 

@@ -205,8 +205,8 @@ TEST_F(ZoomingLens, ErrsAsItSaysWhereTheCurveKnowsTheDistortionLess) {
       FrameLens lens = camera_->lens(k, kRepeatability);
       Camera<double>& camera = lens.calibration.camera;
       const double away = std::max(0.0, std::log(4000 / camera.focal_length) / std::log(4.0));
-      const double of_corner = camera.distortion_of_corner();
-      camera.radial_distortion += away * error * of_corner;
+      const double of_corner = corner_unit(camera)[0];
+      camera.distortion.radial += away * error * of_corner;
       const int of_k = index(Parameter::kRadialDistortion);
       lens.calibration.covariance(of_k, of_k) += std::pow(away * kUnknown * of_corner, 2);
       lens.corner_by_zoom -= error / std::log(4.0);

@@ -7,7 +7,7 @@
 #include <random>
 #include <vector>
 
-#include "core/model/camera.h"
+#include "core/model/lens/camera.h"
 #include "core/model/rotation.h"
 
 namespace alidade::test {
@@ -23,7 +23,7 @@ Camera<double> wide_camera() {
   camera.height = kFlowHeight;
   camera.focal_length = 0.5 * kFlowWidth / std::tan(0.5 * 1.0472);
   const double corner = 0.5 * std::hypot(kFlowWidth, kFlowHeight) / camera.focal_length;
-  camera.radial_distortion = 0.07 / (corner * corner);
+  camera.distortion.radial = 0.07 / (corner * corner);
   return camera;
 }
 

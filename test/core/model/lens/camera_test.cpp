@@ -1,4 +1,4 @@
-#include "core/model/camera.h"
+#include "core/model/lens/camera.h"
 
 #include <gtest/gtest.h>
 
@@ -24,7 +24,7 @@ using test::kEpsilon;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 TEST(Camera, ProjectsByItsDefinition) {
-  const Camera<double> camera{1000, 1.1, 0.5, 640, 480};
+  const Camera<double> camera{1000, 1.1, {0.5}, 640, 480};
   Vec2 u;
   ASSERT_EQ(project(camera, Vec3(0.2, -0.4, 2), &u), ProjectionStatus::kOk);
   const double s = 1 + 0.5 * (0.01 + 0.04);
@@ -115,7 +115,7 @@ using CameraChange = Matrix<double, kCameraParameterCount, 1>;
 Camera<double> changed(Camera<double> camera, const CameraChange& e) {
   camera.focal_length += e[0];
   camera.aspect += e[1];
-  camera.radial_distortion += e[2];
+  camera.distortion.radial += e[2];
   camera.centre_u += e[3];
   camera.centre_v += e[4];
   return camera;
@@ -166,7 +166,7 @@ TEST(Camera, JacobiansOfProjectAgreeWithNumericOnes) {
       // A step of one pixel.
       const auto numeric_d = numeric_jacobian<2, 3>(
           [&](const Vec3& e) { return at(camera, d + e); }, 1 / camera.focal_length);
-      const double k_step = 1e-3 * std::max(1.0, std::abs(camera.radial_distortion));
+      const double k_step = 1e-3 * std::max(1.0, std::abs(camera.distortion.radial));
       const auto numeric_camera = numeric_jacobian<2, kCameraParameterCount>(
           [&](const CameraChange& e) { return at(changed(camera, e), d); }, camera_steps(k_step));
       // A few roundings of coordinates of thousands of pixels.
@@ -197,7 +197,7 @@ TEST(Camera, JacobiansOfUnprojectAgreeWithNumericOnes) {
       };
       const auto numeric_u =
           numeric_jacobian<3, 2>([&](const Vec2& e) { return at(camera, u + e); }, 1.0);
-      const double k_step = 1e-3 * std::max(1.0, std::abs(camera.radial_distortion));
+      const double k_step = 1e-3 * std::max(1.0, std::abs(camera.distortion.radial));
       const auto numeric_camera = numeric_jacobian<3, kCameraParameterCount>(
           [&](const CameraChange& e) { return at(changed(camera, e), u); }, camera_steps(k_step));
       EXPECT_LT(test::disagreement(J_d_u, numeric_u, 1e-15), 1) << named.name;
@@ -221,7 +221,7 @@ TEST(Camera, RefusesDirectionsThatAreNotInFront) {
 }
 
 TEST(Camera, RefusesWhatLiesBeyondTheBarrelsLimit) {
-  const Camera<double> camera{900, 1, -0.2, 1280, 720};
+  const Camera<double> camera{900, 1, {-0.2}, 1280, 720};
   // The model turns back at |x| = 1 / sqrt(3 |k|), in the image at two thirds of that times f.
   const double r_limit = 1 / std::sqrt(0.6);
   const double pixel_limit = 900 * r_limit * 2 / 3;
@@ -276,7 +276,7 @@ TEST(Camera, NeverGivesAnythingButFiniteNumbersWithOk) {
   int ok = 0;
   for (const double f : nasty) {
     for (const double k : nasty) {
-      const Camera<double> camera{f, 1, k, 1280, 720};
+      const Camera<double> camera{f, 1, {k}, 1280, 720};
       for (const double a : nasty) {
         for (const double b : nasty) {
           Vec3 d;

@@ -1,4 +1,4 @@
-#include "core/model/zoom_curve.h"
+#include "core/model/lens/zoom_curve.h"
 
 #include <gtest/gtest.h>
 
@@ -54,7 +54,7 @@ double lens_value(const Calibration& calibration, int quantity) {
     case ZoomQuantity::kLogFocalLength:
       return camera.focal_length;
     case ZoomQuantity::kCornerDistortion:
-      return camera.radial_distortion;
+      return camera.distortion.radial;
     case ZoomQuantity::kCentreU:
       return camera.centre_offset().x();
     default:

@@ -1,8 +1,7 @@
 #pragma once
 // ZoomCurve: a calibration for any zoom reading z of a lens, interpolated between calibrations at
 // some readings, its nodes.
-//   y(z) = (log f, kappa, c_u, c_v);   kappa = k (R / f)^2: distortion in the corner,
-//   R half the image's diagonal (px);  x = (z - z_first) / (z_last - z_first)
+//   y(z): the quantities of zoom_law.h;   x = (z - z_first) / (z_last - z_first)
 //   y_j(z) = level_j + Gaussian process in x with the covariance of ZoomSmoothness
 // Line delay, axes, scales, aspect and clock offset are the same at all readings
 // (kSharedParameters). A lens does not return exactly: each movement offsets log f by eps ~ N(0,
@@ -17,12 +16,9 @@
 #include <cstddef>
 
 #include "core/model/calibration.h"
+#include "core/model/lens/zoom_law.h"
 
 namespace alidade {
-
-// What depends on the reading, in this order.
-enum class ZoomQuantity : int { kLogFocalLength, kCornerDistortion, kCentreU, kCentreV, kCount };
-inline constexpr int kZoomQuantityCount = static_cast<int>(ZoomQuantity::kCount);
 
 // What does not depend on the reading, in this order.
 inline constexpr std::array<Parameter, 9> kSharedParameters = {
@@ -98,8 +94,8 @@ class ZoomCurve {
     if (!(x >= -1 && x <= 2)) return false;
     std::array<Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxNodes, 1>, kZoomQuantityCount>
         weight;
-    Vector4<double> y;
-    Matrix4<double> covariance = Matrix4<double>::Zero();
+    ZoomQuantities<double> y;
+    ZoomQuantityMatrix<double> covariance = ZoomQuantityMatrix<double>::Zero();
     for (int j = 0; j < kZoomQuantityCount; ++j) {
       const auto q = static_cast<std::size_t>(j);
       const ZoomSmoothness& smooth = c_.smoothness[q];
@@ -135,7 +131,7 @@ class ZoomCurve {
   [[nodiscard]] Calibration node(int i) const {
     Calibration calibration;
     const int first = row(i, 0);
-    Vector4<double> y = c_.value.middleRows<kZoomQuantityCount>(first);
+    ZoomQuantities<double> y = c_.value.middleRows<kZoomQuantityCount>(first);
     for (int j = 0; j < kZoomQuantityCount; ++j) y[j] += c_.level[static_cast<std::size_t>(j)];
     assemble(y, c_.covariance.block<kZoomQuantityCount, kZoomQuantityCount>(first, first),
              c_.covariance.block<kSharedCount, kZoomQuantityCount>(row(c_.nodes, 0), first),
@@ -155,30 +151,21 @@ class ZoomCurve {
     return kZoomQuantityCount * node + quantity;
   }
 
-  void assemble(const Vector4<double>& y, const Matrix4<double>& cov_y,
+  void assemble(const ZoomQuantities<double>& y, const ZoomQuantityMatrix<double>& cov_y,
                 const Matrix<double, kSharedCount, kZoomQuantityCount>& cov_shared_y,
                 Calibration* out) const {
-    constexpr std::array<Parameter, kZoomQuantityCount> kOfQuantity = {
-        Parameter::kFocalLength, Parameter::kRadialDistortion, Parameter::kCentreU,
-        Parameter::kCentreV};
     *out = c_.shared;
-    Camera<double>& camera = out->camera;
-    camera.focal_length = std::exp(y[0]);
-    const double per_corner = camera.distortion_of_corner();
-    camera.radial_distortion = per_corner * y[1];
-    camera.set_centre_offset(y.tail<2>());
-    Matrix4<double> J = Matrix4<double>::Identity();  // d (f, k, c) / d y
-    J(0, 0) = camera.focal_length;
-    J(1, 0) = 2 * camera.radial_distortion;
-    J(1, 1) = per_corner;
-    const Matrix4<double> cov_lens = J * cov_y * J.transpose();
+    set_zoom_quantities(y, &out->camera);
+    const ZoomQuantityMatrix<double> J = by_zoom_quantities(out->camera);
+    const ZoomQuantityMatrix<double> cov_lens = J * cov_y * J.transpose();
     const Matrix<double, kSharedCount, kZoomQuantityCount> cov_shared_lens =
         cov_shared_y * J.transpose();
     const int shared_row = kZoomQuantityCount * c_.nodes;
     for (int i = 0; i < kZoomQuantityCount; ++i) {
-      const int a = index(kOfQuantity[static_cast<std::size_t>(i)]);
+      const int a = index(kParameterOfQuantity[static_cast<std::size_t>(i)]);
       for (int j = 0; j < kZoomQuantityCount; ++j) {
-        out->covariance(a, index(kOfQuantity[static_cast<std::size_t>(j)])) = cov_lens(i, j);
+        out->covariance(a, index(kParameterOfQuantity[static_cast<std::size_t>(j)])) =
+            cov_lens(i, j);
       }
       for (int j = 0; j < kSharedCount; ++j) {
         const int b = index(kSharedParameters[static_cast<std::size_t>(j)]);
