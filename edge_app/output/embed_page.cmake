@@ -1,23 +1,30 @@
-# cmake -DPAGE=status_page.html -DSOURCE=status_page_text.cpp -P embed_page.cmake
-# Writes the page into a C++ source, together with a Content-Security-Policy. The policy allows the
-# page's style and script by their SHA-256, and nothing from elsewhere.
+# cmake -DPAGE=page "-DMODULES=numbers;...;main" -DSOURCE=status_page_text.cpp -P embed_page.cmake
+# Joins the files of the folder `page` into one page and writes it into a C++ source, together with a
+# Content-Security-Policy. The policy allows the page's style and script by their SHA-256, and nothing
+# from elsewhere. The modules become one script, in their order, without imports and exports.
 cmake_minimum_required(VERSION 3.16)
-file(READ "${PAGE}" page)
+file(READ "${PAGE}/status_page.html" page)
+file(READ "${PAGE}/style.css" style)
+set(style "\n${style}")
 
-# The text between <element> and </element>, which must occur once.
-function(text_of element result)
-  string(REGEX MATCHALL "<${element}>" openings "${page}")
-  list(LENGTH openings count)
-  if(NOT count EQUAL 1)
-    message(FATAL_ERROR "${PAGE}: ${count} times <${element}>, not once")
+set(script "\n'use strict';\n")
+foreach(module ${MODULES})
+  file(READ "${PAGE}/${module}.js" text)
+  set(text "\n${text}")
+  string(REGEX REPLACE "\nimport {[^}]*} from '[^']*';" "" text "${text}")
+  string(REPLACE "\nexport " "\n" text "${text}")
+  string(APPEND script "${text}")
+endforeach()
+
+# Puts a text in place of a line of the page, which must occur once.
+function(replace_line line text)
+  string(FIND "${page}" "${line}" first)
+  string(FIND "${page}" "${line}" last REVERSE)
+  if(first EQUAL -1 OR NOT first EQUAL last)
+    message(FATAL_ERROR "${PAGE}/status_page.html: should have ${line} once")
   endif()
-  string(FIND "${page}" "<${element}>" from)
-  string(FIND "${page}" "</${element}>" to)
-  string(LENGTH "<${element}>" opening)
-  math(EXPR from "${from} + ${opening}")
-  math(EXPR length "${to} - ${from}")
-  string(SUBSTRING "${page}" ${from} ${length} text)
-  set(${result} "${text}" PARENT_SCOPE)
+  string(REPLACE "${line}" "${text}" page "${page}")
+  set(page "${page}" PARENT_SCOPE)
 endfunction()
 
 # A SHA-256 as a policy has it: 256 bits and two zero bits are 43 digits of base64.
@@ -37,8 +44,8 @@ function(policy_hash text result)
   set(${result} "'sha256-${hash}='" PARENT_SCOPE)
 endfunction()
 
-text_of(style style)
-text_of(script script)
+replace_line("<link rel=\"stylesheet\" href=\"style.css\">" "<style>${style}</style>")
+replace_line("<script type=\"module\" src=\"main.js\"></script>" "<script>${script}</script>")
 policy_hash("${style}" style_hash)
 policy_hash("${script}" script_hash)
 set(policy "default-src 'none'; style-src ${style_hash}; script-src ${script_hash}; connect-src 'self'; img-src data:; ")

@@ -1,5 +1,5 @@
 #pragma once
-// The status page of `alidade run`: status_page.html at GET /, and the live image that it shows.
+// The status page of `alidade run`: page/ as one page at GET /, and the live image that it shows.
 //
 //   GET /                   needs no token: the page itself says nothing of the camera. It asks for
 //                           what it shows, with the token
@@ -17,7 +17,7 @@
 
 namespace alidade {
 
-// The build makes these from status_page.html.
+// The build makes these from page/.
 extern const char* const kStatusPage;
 extern const char* const kStatusPagePolicy;
 

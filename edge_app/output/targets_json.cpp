@@ -1,63 +1,70 @@
 #include "edge_app/output/targets_json.h"
 
+#include <array>
+#include <cstddef>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <utility>
 
-#include "core/model/trigonometry.h"
 #include "edge_app/output/or_null.h"
 #include "edge_app/tracking/frame_view.h"
-#include "edge_app/tracking/target_report.h"
+#include "edge_app/tracking/target_fields.h"
 
 namespace alidade {
 namespace {
 
 using Json = nlohmann::ordered_json;
 
+template <class T>
+Json json_of(const T& value) {
+  return value;
+}
+// A vector as one array, a matrix as its rows.
 template <int rows, int columns>
-Json rows_of(const Matrix<double, rows, columns>& m) {
+Json json_of(const Matrix<double, rows, columns>& m) {
   Json out = Json::array();
   for (int i = 0; i < rows; ++i) {
-    Json row = Json::array();
-    for (int j = 0; j < columns; ++j) row.push_back(m(i, j));
-    out.push_back(std::move(row));
+    if constexpr (columns == 1) {
+      out.push_back(m(i, 0));
+    } else {
+      Json row = Json::array();
+      for (int j = 0; j < columns; ++j) row.push_back(m(i, j));
+      out.push_back(std::move(row));
+    }
   }
   return out;
 }
+template <class T>
+Json json_of(const std::optional<T>& value) {
+  return value ? json_of(*value) : Json();
+}
 
-Json pair_of(double first, double second) { return Json::array({first, second}); }
+// What target_fields.h writes to.
+class TargetJson {
+ public:
+  template <class T>
+  void add(const char* name, const T& value) {
+    json_[name] = json_of(value);
+  }
+  void add_if(const char* name, const std::optional<double>& value) {
+    if (value) add(name, *value);
+  }
+  template <std::size_t kSize>
+  void add_object(const char* name, const TargetKeys<kSize>& keys,
+                  const std::optional<std::array<double, kSize>>& values) {
+    Json& object = json_[name];
+    for (std::size_t i = 0; values && i < kSize; ++i) object[keys[i]] = (*values)[i];
+  }
+  [[nodiscard]] Json take() { return std::move(json_); }
+
+ private:
+  Json json_ = Json::object();
+};
 
 Json target_json(const TargetReport& target, TargetSpace space) {
-  Json out{{"identity", target.identity},
-           {"class", target.name.empty() ? Json() : Json(target.name)},
-           {"score", target.score},
-           {"born_s", target.born_s},
-           {"seen_s", target.seen_s},
-           {"in_view", target.in_view},
-           {"direction", Json::array({target.d_b.x(), target.d_b.y(), target.d_b.z()})}};
-  const auto& state = target.state;
-  if (space == TargetSpace::kPlane) {
-    out["position_m"] = pair_of((*state)[0], (*state)[1]);
-    out["velocity_m_s"] = pair_of((*state)[2], (*state)[3]);
-    if (target.on_earth) {
-      out["latitude_deg"] = target.on_earth->latitude * 180 / kPi;
-      out["longitude_deg"] = target.on_earth->longitude * 180 / kPi;
-    }
-  } else {
-    out["azimuth_rad"] = state ? Json((*state)[0]) : Json();
-    out["elevation_rad"] = state ? Json((*state)[1]) : Json();
-    out["azimuth_rate_rad_s"] = state ? Json((*state)[2]) : Json();
-    out["elevation_rate_rad_s"] = state ? Json((*state)[3]) : Json();
-  }
-  out["covariance"] = state ? rows_of(target.cov) : Json();
-  out["pixel"] = target.pixel ? pair_of(target.pixel->x(), target.pixel->y()) : Json();
-  out["covariance_px2"] = target.pixel ? rows_of(target.cov_px) : Json();
-  out["box"] = nullptr;
-  if (target.box) {
-    out["box"] = {{"u", target.box->u},
-                  {"v", target.box->v},
-                  {"width", target.box->width},
-                  {"height", target.box->height}};
-  }
-  return out;
+  TargetJson json;
+  add_fields(target, space, &json);
+  return json.take();
 }
 
 }  // namespace

@@ -1,6 +1,6 @@
 #pragma once
 // Targets as JSON: the answer of GET /api/v1/targets, the event `targets` and a line of
-// output.targets. Names and units: openapi.yaml.
+// output.targets. Names and units: target_fields.yaml.
 
 #include <nlohmann/json_fwd.hpp>
 #include <string>

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Do all interfaces have the record's fields as edge_app/record/record_fields.yaml lists them? And are slips in the list named?"""
+"""Do all interfaces have the fields of records and targets as their lists have them? And are slips in a list named?"""
 import pathlib
 import shutil
 import subprocess
@@ -8,9 +8,36 @@ import tempfile
 import unittest
 
 TOP = pathlib.Path(__file__).resolve().parents[2]
-FILES = ("scripts/generate-fields", ".clang-format", "edge_app/record/record_fields.yaml", "edge_app/record/record_fields.h",
-         "edge_app/output/openapi.yaml", "docs/records.md", "ros_wrapper/alidade_msgs/msg/FrameOrientation.msg",
-         "ros_wrapper/alidade_ros/include/alidade_ros/record_fields.h", "ros_wrapper/alidade_ros/src/record_fields.cpp")
+RECORD_LIST = "edge_app/record/record_fields.yaml"
+TARGET_LIST = "edge_app/tracking/target_fields.yaml"
+OPENAPI = "edge_app/output/openapi.yaml"
+# What is generated, and what a new field brings there.
+OF_RECORDS = {
+    "edge_app/record/record_fields.h": 'line->add("sun_rad", record.sun_rad);',
+    OPENAPI: "sun_rad: {type: number, nullable: true",
+    "docs/records.md": "| `sun_rad` | rad | how high the Sun stands; `null`: it is night |",
+    "ros_wrapper/alidade_msgs/msg/FrameOrientation.msg": "float64 sun ",
+    "ros_wrapper/alidade_ros/include/alidade_ros/record_fields.h": "std::optional<double> sun_rad;",
+    "ros_wrapper/alidade_ros/src/record_fields.cpp": "message->sun = record.sun_rad.value_or(kNan);",
+}
+OF_TARGETS = {
+    "edge_app/tracking/target_fields.h": 'if (on_plane) line->add("height_m", target.height_m);',
+    OPENAPI: "height_m: {type: number, nullable: true, minimum: 0, description: \"m; how tall it is; null: nobody knows\"}",
+    "docs/target_tracking.md": "| `height_m` | m | how tall it is; only on the plane; `null`: nobody knows |",
+    "ros_wrapper/alidade_msgs/msg/Target.msg": "float64 height               # m; how tall it is; NaN: nobody knows",
+    "ros_wrapper/alidade_ros/src/target_fields.cpp": 'message->height = read.number_or_nan("height_m");',
+}
+NEW_OF_TARGETS = """
+- name: height_m
+  type: number
+  unit: m
+  space: plane
+  null_if: nobody knows
+  minimum: 0
+  says: how tall it is
+  value: target.height_m
+  ros: {name: height, type: float64}
+"""
 NEW = """
 - name: sun_rad
   type: number
@@ -27,10 +54,10 @@ class GeneratedFields(unittest.TestCase):
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)
         self.top = pathlib.Path(folder.name)
-        for file in FILES:
+        shutil.copytree(TOP / "scripts/fields", self.top / "scripts/fields", ignore=shutil.ignore_patterns("__pycache__"))
+        for file in {"scripts/generate-fields", ".clang-format", RECORD_LIST, TARGET_LIST, *OF_RECORDS, *OF_TARGETS}:
             (self.top / file).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(TOP / file, self.top / file)
-        self.list = self.top / "edge_app/record/record_fields.yaml"
 
     def run_script(self, *arguments):
         run = subprocess.run([sys.executable, "-B", self.top / "scripts/generate-fields", *arguments], stdout=subprocess.PIPE,
@@ -41,47 +68,57 @@ class GeneratedFields(unittest.TestCase):
         self.assertEqual(self.run_script("--check"), (0, ""))
 
     def test_a_new_field_is_wanted_everywhere_and_comes_everywhere(self):
-        self.list.write_text(self.list.read_text() + NEW)
-        code, output = self.run_script("--check")
-        self.assertEqual(code, 1)
-        for file in FILES[3:]:
-            self.assertIn(f"{file}: not as ", output)
-        self.assertEqual(self.run_script()[0], 0)
-        self.assertEqual(self.run_script("--check"), (0, ""))
-        self.assertIn('line->add("sun_rad", record.sun_rad);', (self.top / FILES[3]).read_text())
-        self.assertIn("sun_rad: {type: number, nullable: true", (self.top / FILES[4]).read_text())
-        self.assertIn("| `sun_rad` | rad | how high the Sun stands; `null`: it is night |", (self.top / FILES[5]).read_text())
-        self.assertIn("float64 sun ", (self.top / FILES[6]).read_text())
-        self.assertIn("std::optional<double> sun_rad;", (self.top / FILES[7]).read_text())
-        self.assertIn("message->sun = record.sun_rad.value_or(kNan);", (self.top / FILES[8]).read_text())
-
-    def test_an_interface_that_was_changed_by_hand_is_named(self):
-        for file in FILES[3:]:
-            with self.subTest(file=file):
-                path = self.top / file
-                text = path.read_text()
-                path.write_text(text.replace("telemetry_age", "telemetry_old"))
+        for source, new, files in ((RECORD_LIST, NEW, OF_RECORDS), (TARGET_LIST, NEW_OF_TARGETS, OF_TARGETS)):
+            with self.subTest(source=source):
+                path = self.top / source
+                path.write_text(path.read_text() + new)
                 code, output = self.run_script("--check")
                 self.assertEqual(code, 1)
-                self.assertIn(f"{file}: not as ", output)
-                path.write_text(text)
+                for file in files:
+                    self.assertIn(f"{file}: not as {source} has it", output)
+                self.assertEqual(self.run_script()[0], 0)
+                self.assertEqual(self.run_script("--check"), (0, ""))
+                for file, line in files.items():
+                    self.assertIn(line, (self.top / file).read_text())
 
-    def test_slips_in_the_list_are_named(self):
-        for wrong, told in ((NEW.replace("says:", "sais:"), "sun_rad: sais is unknown"),
-                            (NEW.replace("  value: record.sun_rad\n", ""), "sun_rad: value is missing"),
-                            (NEW.replace("type: number", "type: angle"), "sun_rad: type is angle; it may be array, "),
-                            (NEW.replace("type: number", "type: array"), "sun_rad: an array has columns"),
-                            (NEW.replace("sun_rad", "zoom"), "zoom stands there twice"),
-                            (NEW.replace("type: number", "type: integer"), "sun_rad: an integer that may be null has ros: as: presence"),
-                            (NEW.replace("type: number", "type: boolean"), "sun_rad: a field of type boolean cannot be null"),
-                            ("- [", "generate-fields: ")):
-            with self.subTest(told=told):
-                text = self.list.read_text()
-                self.list.write_text(text + wrong)
-                code, output = self.run_script()
-                self.assertEqual(code, 1)
-                self.assertIn(told, output)
-                self.list.write_text(text)
+    def test_an_interface_that_was_changed_by_hand_is_named(self):
+        for files, was, made in ((OF_RECORDS, "telemetry_age", "telemetry_old"), (OF_TARGETS, "latitude", "breadth")):
+            for file in files:
+                path = self.top / file
+                path.write_text(path.read_text().replace(was, made))
+        code, output = self.run_script("--check")
+        self.assertEqual(code, 1)
+        for file in (*OF_RECORDS, *OF_TARGETS):
+            self.assertIn(f"{file}: not as ", output)
+
+    def test_slips_in_a_list_are_named(self):
+        of_records = ((NEW.replace("says:", "sais:"), "sun_rad: sais is unknown"),
+                      (NEW.replace("  value: record.sun_rad\n", ""), "sun_rad: value is missing"),
+                      (NEW.replace("type: number", "type: angle"), "sun_rad: type is angle; it may be array, "),
+                      (NEW.replace("type: number", "type: array"), "sun_rad: an array has columns"),
+                      (NEW.replace("type: number", "type: object"), "sun_rad: an object has members"),
+                      (NEW.replace("sun_rad", "zoom"), "zoom stands there twice"),
+                      (NEW.replace("type: number", "type: integer"), "sun_rad: an integer that may be null has ros: as: presence"),
+                      (NEW.replace("type: number", "type: boolean"), "sun_rad: a field of type boolean cannot be null"),
+                      ("- [", "generate-fields: "))
+        new = NEW_OF_TARGETS
+        of_targets = ((new.replace("says:", "sais:"), "height_m: sais is unknown"),
+                      (new.replace("height_m", "pixel"), "pixel stands there twice"),
+                      (new.replace("type: number", "type: vector"), "height_m: a vector has a size"),
+                      (new.replace("type: number", "type: matrix\n  size: 2"), "height_m: ros: as is missing"),
+                      (new.replace("type: number", "type: integer"), "height_m: a ROS message cannot say that an integer is missing"),
+                      (new.replace("space: plane", "space: air"), "height_m: space is air"),
+                      (new.replace("null_if", "left_out_if").replace("type: number", "type: word"), "height_m: only a number may be left out"))
+        for source, slips in ((RECORD_LIST, of_records), (TARGET_LIST, of_targets)):
+            path = self.top / source
+            text = path.read_text()
+            for wrong, told in slips:
+                with self.subTest(told=told):
+                    path.write_text(text + wrong)
+                    code, output = self.run_script()
+                    self.assertEqual(code, 1)
+                    self.assertIn(told, output)
+            path.write_text(text)
 
 
 if __name__ == "__main__":

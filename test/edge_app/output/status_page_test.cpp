@@ -86,6 +86,21 @@ TEST_F(StatusPageTest, ThePageIsOpenAndMayLoadNothingFromElsewhere) {
   EXPECT_EQ(page.find("https:"), std::string::npos);
 }
 
+int count_of(const std::string& text, const std::string& page) {
+  int count = 0;
+  for (std::size_t at = page.find(text); at != std::string::npos; at = page.find(text, at + 1))
+    ++count;
+  return count;
+}
+
+TEST(StatusPage, IsOneStyleAndOneScript) {
+  const std::string page = kStatusPage;
+  for (const char* element : {"<style", "<script"})
+    EXPECT_EQ(count_of(element, page), 1) << element;
+  for (const char* left : {"\nimport ", "\nexport ", "style.css\"", "main.js\""})
+    EXPECT_EQ(page.find(left), std::string::npos) << left;
+}
+
 TEST(StatusPage, SaysInWordsWhatEachStatusMeans) {
   const std::string page = kStatusPage;
   for (const RecordStatus status : kRecordStatuses)
