@@ -77,7 +77,7 @@ MotionReport motion_of(const Measured& measured, const VideoReport& video,
       "upright, for pan " +
       needs.reverse_pan + ", for tilt " + needs.reverse_tilt;
   needs.no_times = why_no_times(video.clock);
-  return check_motion(shifts, telemetry.fresh, needs);
+  return check_measured_motion(shifts, telemetry.fresh, needs);
 }
 
 std::string zooms_of(const NamedCalibration& calibration) {
