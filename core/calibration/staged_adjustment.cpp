@@ -31,7 +31,7 @@ double median_error(const std::vector<LinearisedResidual>& residuals) {
 
 }  // namespace
 
-StagedAdjustment::StagedAdjustment(const StartValues& start, const TelemetryNoise& noise,
+StagedAdjustment::StagedAdjustment(const StartValues& start, const TelemetryAngleNoise& noise,
                                    int max_knots, SelectedInput* selected)
     : selected_(selected),
       noise_(noise),

@@ -21,7 +21,7 @@ struct Adjusted {
 class StagedAdjustment {
  public:
   // selected must outlive this object, which sets outliers, noise and crossings in it.
-  StagedAdjustment(const StartValues& start, const TelemetryNoise& noise, int max_knots,
+  StagedAdjustment(const StartValues& start, const TelemetryAngleNoise& noise, int max_knots,
                    SelectedInput* selected);
 
   // Cauchy loss; its scale follows the residuals' medians down to 3 sigmas. Splits the spline's
@@ -49,7 +49,7 @@ class StagedAdjustment {
   void allow_for_shared_errors();
 
   SelectedInput* selected_;
-  TelemetryNoise noise_;
+  TelemetryAngleNoise noise_;
   int max_knots_;
   std::string doubt_;
   Adjustment adjustment_;

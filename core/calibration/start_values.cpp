@@ -105,7 +105,7 @@ StageStatus find_motion(const CalibrationInput& input, const CalibrationOptions&
   if (!smooth) {
     return {CalibrationStatus::kBadInput, "the telemetry cannot be fitted by a smooth motion"};
   }
-  TelemetryNoise& noise = motion->noise;
+  TelemetryAngleNoise& noise = motion->noise;
   noise.resolution_rad = angle_resolution(telemetry);
   const double rounding_variance = noise.resolution_rad * noise.resolution_rad / 12;
   const double stated = input.noise.pan_tilt_sigma_rad.value_or(0);

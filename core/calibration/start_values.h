@@ -18,13 +18,13 @@
 namespace alidade::internal {
 
 // Errors of the telemetry's angles.
-struct TelemetryNoise {
+struct TelemetryAngleNoise {
   double resolution_rad = 0;   // 0: angles are not rounded
   double white_sigma_rad = 0;  // without rounding
 };
 
 struct MotionStart {
-  TelemetryNoise noise;
+  TelemetryAngleNoise noise;
   MotionMatch match;
 };
 

@@ -9,7 +9,7 @@ SplineWeights make_spline_weights() {
   SplineWeights all{};
   for (std::size_t i = 0; i < all.size(); ++i) {
     const Taps<4> taps =
-        CubicSpline::taps(static_cast<float>(i) / static_cast<float>(internal::kSplineSteps));
+        CubicBSpline::taps(static_cast<float>(i) / static_cast<float>(internal::kSplineSteps));
     for (std::size_t k = 0; k < 4; ++k) all[i][k] = taps.weight[k];
   }
   return all;

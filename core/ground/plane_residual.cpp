@@ -144,7 +144,7 @@ void bearing_residual(const PlaneDatum& datum, const TrueSight& sight, const Wor
 }
 
 // The place on the plane that a sight shows.
-struct SeenPlace {
+struct SightedPlace {
   Vector2<double> X;
   Matrix<double, 2, 3> J_X_d;
   Matrix<double, 2, kPlaneParameterCount> J_X_plane;
@@ -156,8 +156,8 @@ struct SeenPlace {
 
 bool length_residual(const PlaneDatum& datum, const TrueSight& from, const TrueSight& to,
                      const WorldPlane& plane, DatumResidual* out) {
-  SeenPlace a;
-  SeenPlace b;
+  SightedPlace a;
+  SightedPlace b;
   if (!a.find(plane, from) || !b.find(plane, to)) return false;
   const Vector2<double> between = b.X - a.X;
   const double length = between.norm();
@@ -175,7 +175,7 @@ bool length_residual(const PlaneDatum& datum, const TrueSight& from, const TrueS
 
 bool upright_residual(const PlaneDatum& datum, const TrueSight& foot, const TrueSight& head,
                       const WorldPlane& plane, DatumResidual* out) {
-  SeenPlace stands;
+  SightedPlace stands;
   if (!stands.find(plane, foot)) return false;
   const Vector3<double> top(stands.X.x(), stands.X.y(), datum.value);
   Vector3<double> d;

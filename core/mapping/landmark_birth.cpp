@@ -1,4 +1,4 @@
-// New landmarks of LandmarkUpkeep: features that no landmark explains and that are seen repeatedly,
+// New landmarks of SceneMapUpkeep: features that no landmark explains and that are seen repeatedly,
 // and the room for them.
 
 #include <algorithm>
@@ -21,7 +21,7 @@ int squared_distance(const Descriptor& a, const Descriptor& b) {
 
 }  // namespace
 
-void LandmarkUpkeep::find_candidates(const UpkeepView& view, const SceneMap& map, Picture* picture,
+void SceneMapUpkeep::find_candidates(const UpkeepView& view, const SceneMap& map, Picture* picture,
                                      UpkeepCounts* counts, std::vector<SceneLandmark>* ready) {
   const std::vector<Feature>& features = view.features->features;
   const std::vector<Descriptor>& descriptors = view.features->descriptors;
@@ -113,7 +113,7 @@ void LandmarkUpkeep::find_candidates(const UpkeepView& view, const SceneMap& map
   candidates_ = std::move(kept);
 }
 
-void LandmarkUpkeep::give_birth(const std::vector<SceneLandmark>& ready, double now_utc_s,
+void SceneMapUpkeep::give_birth(const std::vector<SceneLandmark>& ready, double now_utc_s,
                                 const SceneMap& map, Picture* picture, MapChange* change,
                                 UpkeepCounts* counts) {
   if (ready.empty()) return;

@@ -29,7 +29,7 @@ constexpr double kBend_sigmas = 2.5;  // where Huber's loss becomes linear
 constexpr double kKeptOrientation_rad = 1e-7;
 
 // The unknowns; the problem's parameter blocks point into it.
-struct MapState {
+struct MapUnknowns {
   std::vector<Vector4<double>> pictures;  // xi, eps
   std::vector<Vector3<double>> d_start;
   std::vector<Vector2<double>> landmarks;  // change of d_start
@@ -105,7 +105,8 @@ std::vector<Vector3<double>> start_directions(const MapEvidence& evidence, const
 }
 
 // The used observations, of landmarks that two pictures or more see.
-std::vector<bool> tied(const MapEvidence& evidence, const MapState& state, std::vector<bool> used) {
+std::vector<bool> tied(const MapEvidence& evidence, const MapUnknowns& state,
+                       std::vector<bool> used) {
   std::vector<int> count(state.d_start.size(), 0);
   for (std::size_t i = 0; i < used.size(); ++i) {
     if (used[i]) ++count[static_cast<std::size_t>(evidence.observations[i].landmark)];
@@ -132,7 +133,7 @@ struct MapProblem {
 
 std::unique_ptr<MapProblem> build_problem(const MapEvidence& evidence, const MapOptions& options,
                                           const std::vector<bool>& used, double noise,
-                                          MapState* state) {
+                                          MapUnknowns* state) {
   auto out = std::make_unique<MapProblem>();
   ceres::Problem& problem = out->problem;
   LensCurve& lens = state->lens;
@@ -217,7 +218,7 @@ bool solve(const MapOptions& options, double least_gain, MapProblem* map, bool* 
 
 // Squared residual of each observation in its sigmas; infinite if the state does not project it.
 std::vector<double> squares_of(const MapEvidence& evidence, const MapOptions& options,
-                               const MapState& state) {
+                               const MapUnknowns& state) {
   std::vector<double> out;
   const double hold = state.lens.hold();
   for (const MapObservation& seen : evidence.observations) {
@@ -309,7 +310,8 @@ bool shared_covariance(MapProblem* map, Eigen::MatrixXd* covariance, double* noi
 
 // Derivative of the pictures' (xi, log f) by the shared unknowns. There xi is of R_start Exp(xi),
 // here of R Exp(xi).
-Eigen::SparseMatrix<double> pictures_by_shared(const MapEvidence& evidence, const MapState& state) {
+Eigen::SparseMatrix<double> pictures_by_shared(const MapEvidence& evidence,
+                                               const MapUnknowns& state) {
   const auto pictures = static_cast<Eigen::Index>(evidence.pictures.size());
   std::vector<Eigen::Triplet<double>> entries;
   for (Eigen::Index i = 0; i < pictures; ++i) {
@@ -343,8 +345,8 @@ std::vector<SeenIn> seen_in(const MapEvidence& evidence, const std::vector<bool>
   return out;
 }
 
-void write_result(const MapEvidence& evidence, const std::vector<bool>& used, const MapState& state,
-                  MapAdjustment* out) {
+void write_result(const MapEvidence& evidence, const std::vector<bool>& used,
+                  const MapUnknowns& state, MapAdjustment* out) {
   out->lens = state.lens;
   for (std::size_t i = 0; i < evidence.pictures.size(); ++i) {
     const MapPicture& picture = evidence.pictures[i];
@@ -387,7 +389,7 @@ const char* to_string(MapStatus status) {
 MapAdjustment adjust_map(const MapEvidence& evidence, const MapOptions& options) {
   MapAdjustment out;
   if (!is_usable(evidence, options)) return out;
-  MapState state;
+  MapUnknowns state;
   state.pictures.assign(evidence.pictures.size(), Vector4<double>::Zero());
   state.landmarks.assign(static_cast<std::size_t>(evidence.landmarks), Vector2<double>::Zero());
   state.lens = options.start.value_or(options.lens);

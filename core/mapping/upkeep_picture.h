@@ -1,5 +1,5 @@
 #pragma once
-// LandmarkUpkeep's data on one picture, for map_upkeep.cpp and landmark_birth.cpp alone: its pose,
+// SceneMapUpkeep's data on one picture, for scene_map_upkeep.cpp and landmark_birth.cpp alone: its pose,
 // where it shows the map's landmarks, and what was found and changed of them.
 
 #include <cstddef>
@@ -7,11 +7,11 @@
 #include <map>
 #include <vector>
 
-#include "core/mapping/map_upkeep.h"
+#include "core/mapping/scene_map_upkeep.h"
 
 namespace alidade {
 
-struct LandmarkUpkeep::Picture {
+struct SceneMapUpkeep::Picture {
   struct Box {
     Vector2<double> least, most;
     bool empty = true;

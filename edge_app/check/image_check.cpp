@@ -30,7 +30,7 @@ void judge(ImageReport* report, const ImageNeeds& needs) {
   const auto add = [&](Severity as, const std::string& text) {
     report->findings.push_back({as, "video " + needs.source + ": " + text});
   };
-  const Light& light = report->light;
+  const ImageLight& light = report->light;
   if (light.dark > 0.99) {
     add(severity, "the picture is black; take off the cap, open the iris, give light");
   } else if (light.saturated > 0.9) {
@@ -60,7 +60,7 @@ void judge(ImageReport* report, const ImageNeeds& needs) {
 
 }  // namespace
 
-Light measure_light(const ImageView& image) {
+ImageLight measure_light(const ImageView& image) {
   constexpr int kStep = 8;
   constexpr int kDark = 16;
   constexpr int kLeastTop = 230;
@@ -71,7 +71,7 @@ Light measure_light(const ImageView& image) {
     for (int u = 0; u < image.width; u += kStep) ++histogram[row[u]];
     count += static_cast<std::size_t>((image.width + kStep - 1) / kStep);
   }
-  Light light;
+  ImageLight light;
   const auto all = static_cast<double>(count);
   double below = 0;
   double darkest = -1;
@@ -126,13 +126,13 @@ ImageReport ImageCheck::report(const ImageNeeds& needs) const {
   report.images = lights_.size();
   report.without = without_;
   report.shifts = shifts_;
-  const auto median_light = [&](double Light::*member) {
+  const auto median_light = [&](double ImageLight::*member) {
     std::vector<double> values;
-    for (const Light& light : lights_) values.push_back(light.*member);
+    for (const ImageLight& light : lights_) values.push_back(light.*member);
     return median_of(values);
   };
-  report.light = {median_light(&Light::mean), median_light(&Light::range),
-                  median_light(&Light::dark), median_light(&Light::saturated)};
+  report.light = {median_light(&ImageLight::mean), median_light(&ImageLight::range),
+                  median_light(&ImageLight::dark), median_light(&ImageLight::saturated)};
   report.points = spread_of(points_);
   report.noise = median_of(noise_);
   if (report.images == 0 && report.without > 0) {

@@ -30,7 +30,7 @@ struct ImageShift {
   Vector2<double> shift = Vector2<double>::Zero();  // px
 };
 
-struct Light {
+struct ImageLight {
   double mean = 0;       // grey levels
   double range = 0;      // grey levels, from the darkest 1 % to the brightest 1 %
   double dark = 0;       // share of the pixels
@@ -38,7 +38,7 @@ struct Light {
 };
 
 // image: valid().
-[[nodiscard]] Light measure_light(const ImageView& image);
+[[nodiscard]] ImageLight measure_light(const ImageView& image);
 
 struct ImageNeeds {
   std::string source;
@@ -48,7 +48,7 @@ struct ImageNeeds {
 struct ImageReport {
   std::size_t images = 0;
   std::size_t without = 0;  // frames without an image
-  Light light;              // medians
+  ImageLight light;         // medians
   std::optional<Spread> points;
   double noise = 0;  // of a pixel, grey levels, median
   std::vector<ImageShift> shifts;
@@ -67,7 +67,7 @@ class ImageCheck {
   int width_ = 0;
   int height_ = 0;
   std::optional<std::int64_t> before_;  // the frame with which the tracker compares
-  std::vector<Light> lights_;
+  std::vector<ImageLight> lights_;
   std::vector<double> points_;
   std::vector<double> noise_;
   std::vector<ImageShift> shifts_;

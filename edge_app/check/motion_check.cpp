@@ -145,8 +145,9 @@ const char* to_string(AxisVerdict verdict) {
 
 }  // namespace
 
-MotionReport check_motion(const std::vector<TimedShift>& shifts,
-                          const std::vector<PanTiltSample>& samples, const MotionNeeds& needs) {
+MotionReport check_measured_motion(const std::vector<TimedShift>& shifts,
+                                   const std::vector<PanTiltSample>& samples,
+                                   const MotionNeeds& needs) {
   MotionReport report;
   const std::vector<TimedShift> motions = over_baseline(shifts);
   const HeadPath head(samples);

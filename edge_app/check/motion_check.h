@@ -55,9 +55,9 @@ struct MotionReport {
 };
 
 // shifts, samples: in order of time. samples: without stale repeats.
-[[nodiscard]] MotionReport check_motion(const std::vector<TimedShift>& shifts,
-                                        const std::vector<PanTiltSample>& samples,
-                                        const MotionNeeds& needs);
+[[nodiscard]] MotionReport check_measured_motion(const std::vector<TimedShift>& shifts,
+                                                 const std::vector<PanTiltSample>& samples,
+                                                 const MotionNeeds& needs);
 
 [[nodiscard]] ReportLines describe(const MotionReport& report);
 

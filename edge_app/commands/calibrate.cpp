@@ -89,13 +89,13 @@ void set_lens_prior(const CalibrateOptions& options, CalibrationJob* job) {
   give_way("--line-delay", options.line_delay, "line delay", &job->known.line_delay);
 }
 
-std::vector<ZoomJob> load_jobs(const CalibrateOptions& options) {
-  std::vector<ZoomJob> jobs;
+std::vector<CalibrationJob> load_jobs(const CalibrateOptions& options) {
+  std::vector<CalibrationJob> jobs;
   for (const std::string& recording : options.recordings) {
     for (CalibrationJob& job : load_calibration_jobs(recording, options.zoom_tolerance)) {
       set_priors(options, &job.options);
       set_lens_prior(options, &job);
-      jobs.push_back({recording, std::move(job)});
+      jobs.push_back(std::move(job));
     }
   }
   return jobs;
@@ -111,9 +111,9 @@ std::string tracks_text(const std::vector<CalibrationObservation>& observations)
   return text;
 }
 
-int calibrate_one(const std::string& recording, const CalibrateOptions& options, CalibrationJob job,
-                  StopSignals* signals) {
-  const CalibrationResult result = calibrate_job(recording, options.passes, &job, signals);
+int calibrate_one(const CalibrateOptions& options, CalibrationJob job, StopSignals* signals) {
+  const std::string& recording = job.recording;
+  const CalibrationResult result = calibrate_job(options.passes, &job, signals);
   for (const std::string& remark : job.remarks) spdlog::warn("{}: {}", recording, remark);
   // Without a solution there is nothing to plot.
   if (result.frames.empty()) {
@@ -168,9 +168,9 @@ int calibrate_recordings(const CalibrateOptions& options) {
   StopSignals signals;
   const OutputLock lock(output_path(options.directory, options.recordings.front()) +
                         "/calibration.yaml");
-  std::vector<ZoomJob> jobs = load_jobs(options);
+  std::vector<CalibrationJob> jobs = load_jobs(options);
   if (jobs.size() > 1) return calibrate_zooms(options, std::move(jobs), &signals);
-  return calibrate_one(jobs.front().recording, options, std::move(jobs.front().job), &signals);
+  return calibrate_one(options, std::move(jobs.front()), &signals);
 }
 
 }  // namespace alidade

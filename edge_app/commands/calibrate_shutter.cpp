@@ -23,7 +23,7 @@
 #include "edge_app/commands/output_directory.h"
 #include "edge_app/commands/pattern_video.h"
 #include "edge_app/commands/stop_signals.h"
-#include "edge_app/output/lens_rows.h"
+#include "edge_app/output/lens_table.h"
 #include "edge_app/output/pattern_report.h"
 #include "edge_app/storage/lens_file.h"
 
@@ -88,7 +88,7 @@ std::string text_of(const PatternCalibration& calibration, const PatternVideo& v
       "px\n",
       video.found, video.images, calibration.observations, calibration.left_out,
       calibration.sigma_px);
-  for (const LensRow& row : lens_rows(calibration)) {
+  for (const LensTableRow& row : lens_table(calibration)) {
     const std::string sigma = (row.sigma == "exact" ? "" : "± ") + row.sigma;
     text += fmt::format("  {:<17}{:>14} {} {}\n", row.name, row.value, sigma, row.unit);
   }

@@ -37,13 +37,13 @@ void refuse_priors_of_one_zoom(const CalibrateOptions& options, std::size_t stre
   refuse("--radial-distortion", options.radial_distortion);
 }
 
-void require_readings(const std::vector<ZoomJob>& jobs) {
-  for (const ZoomJob& each : jobs) {
-    if (each.job.zoom) continue;
+void require_readings(const std::vector<CalibrationJob>& jobs) {
+  for (const CalibrationJob& job : jobs) {
+    if (job.zoom) continue;
     throw CommandError(kExitUsage,
                        fmt::format("{}: telemetry.csv has no zoom reading, which one of several "
                                    "recordings needs; calibrate it alone, or add the column zoom",
-                                   each.recording));
+                                   job.recording));
   }
 }
 
@@ -131,12 +131,13 @@ std::vector<Calibration> nodes_of(const ZoomCurve& curve) {
 // What the tracks show while the zoom moves. calibration_of: each job's index in `calibrations`, if
 // it was calibrated.
 std::vector<MovementObservation> observe_movements(
-    const std::vector<ZoomJob>& jobs, const std::vector<std::optional<std::size_t>>& calibration_of,
+    const std::vector<CalibrationJob>& jobs,
+    const std::vector<std::optional<std::size_t>>& calibration_of,
     const std::vector<Calibration>& calibrations, const ZoomCurve& curve) {
   std::vector<MovementObservation> observations;
   const std::vector<double> readings = readings_between(calibrations);
   for (std::size_t i = 1; i < jobs.size(); ++i) {
-    const auto& movement = jobs[i].job.movement;
+    const auto& movement = jobs[i].movement;
     if (!movement || !(calibration_of[i - 1] || calibration_of[i])) continue;
     MovementObservation observation;
     std::string error;
@@ -154,7 +155,7 @@ std::vector<MovementObservation> observe_movements(
 
 }  // namespace
 
-int calibrate_zooms(const CalibrateOptions& options, std::vector<ZoomJob> jobs,
+int calibrate_zooms(const CalibrateOptions& options, std::vector<CalibrationJob> jobs,
                     StopSignals* signals) {
   refuse_priors_of_one_zoom(options, jobs.size());
   require_readings(jobs);
@@ -164,10 +165,10 @@ int calibrate_zooms(const CalibrateOptions& options, std::vector<ZoomJob> jobs,
   ZoomFitOptions fit_options;
   const std::string now = fmt::format("{:%Y-%m-%d %H:%M} UTC", fmt::gmtime(std::time(nullptr)));
   for (std::size_t i = 0; i < jobs.size(); ++i) {
-    auto& [recording, job] = jobs[i];
-    const std::string name = fmt::format("{} at zoom {:g}", recording, *job.zoom);
+    CalibrationJob& job = jobs[i];
+    const std::string name = fmt::format("{} at zoom {:g}", job.recording, *job.zoom);
     job.options.centre_sigma_px = kUsualCentreShare * job.input.width;
-    CalibrationResult result = calibrate_job(recording, options.passes, &job, signals);
+    CalibrationResult result = calibrate_job(options.passes, &job, signals);
     for (const std::string& remark : job.remarks) spdlog::warn("{}: {}", name, remark);
     if (!result.frames.empty()) {
       directory.add("report", fmt::format("report-{}.html", i + 1).c_str(),
@@ -190,7 +191,7 @@ int calibrate_zooms(const CalibrateOptions& options, std::vector<ZoomJob> jobs,
                                                 "calibrated: {}",
                                                 calibrations.size(), jobs.size(), error));
   }
-  for (auto& [recording, job] : jobs) track_movement(recording, &job, signals);
+  for (CalibrationJob& job : jobs) track_movement(&job, signals);
   const std::vector<MovementObservation> movements =
       observe_movements(jobs, calibration_of, calibrations, fit.curve);
   if (!movements.empty()) {

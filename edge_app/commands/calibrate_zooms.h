@@ -12,14 +12,9 @@
 
 namespace alidade {
 
-struct ZoomJob {
-  std::string recording;  // directory
-  CalibrationJob job;
-};
-
 // Writes calibration.yaml with the curve, and a report for each dwell. A dwell that cannot be
 // calibrated is left out with a warning. Returns the exit code; throws CommandError.
-[[nodiscard]] int calibrate_zooms(const CalibrateOptions& options, std::vector<ZoomJob> jobs,
+[[nodiscard]] int calibrate_zooms(const CalibrateOptions& options, std::vector<CalibrationJob> jobs,
                                   StopSignals* signals);
 
 }  // namespace alidade

@@ -154,6 +154,7 @@ std::vector<CalibrationJob> load_calibration_jobs(const std::string& directory,
   require_file("telemetry.csv", "a calibration needs what the head reported");
 
   CalibrationJob job;
+  job.recording = directory;
   job.tracks_from_video = !fs::exists(fs::path(directory) / "tracks.csv") && has_video(directory);
   if (!job.tracks_from_video) {
     require_file("tracks.csv",

@@ -15,6 +15,7 @@
 namespace alidade {
 
 struct CalibrationJob {
+  std::string recording;  // directory
   CalibrationInput input;
   CalibrationOptions options;
   KnownCamera known;  // priors from a lens.yaml, in addition to the options

@@ -53,7 +53,7 @@ std::string reverse_advice(const PanTiltConfig& pan_tilt, bool is_pan) {
 
 MotionReport motion_of(const Measured& measured, const VideoReport& video,
                        const TelemetryReport& telemetry, const Config& config,
-                       const NamedCalibration& calibration) {
+                       const PublishedCalibration& calibration) {
   std::unordered_map<std::int64_t, double> time_of;
   for (std::size_t i = 0; i < measured.frames.size(); ++i) {
     time_of[measured.frames[i].stamp.frame] = video.time_s[i];
@@ -77,10 +77,10 @@ MotionReport motion_of(const Measured& measured, const VideoReport& video,
       "upright, for pan " +
       needs.reverse_pan + ", for tilt " + needs.reverse_tilt;
   needs.no_times = why_no_times(video.clock);
-  return check_motion(shifts, telemetry.fresh, needs);
+  return check_measured_motion(shifts, telemetry.fresh, needs);
 }
 
-std::string zooms_of(const NamedCalibration& calibration) {
+std::string zooms_of(const PublishedCalibration& calibration) {
   const ZoomCurve& curve = calibration.zoom_curve;
   if (!calibration.calibration.zoom) return "";
   if (curve.empty()) return fmt::format("{}", *calibration.calibration.zoom);
@@ -93,7 +93,7 @@ std::string zooms_of(const NamedCalibration& calibration) {
 // The calibration that `run` would use at the last reported zoom. The one that it starts with if it
 // has none for that zoom.
 struct CalibrationHere {
-  NamedCalibration calibration;
+  PublishedCalibration calibration;
   std::string lens;  // in words; empty: no zoom is reported, or there is no calibration for it
 };
 
@@ -123,7 +123,7 @@ CalibrationHere calibration_here(const Measured& measured, const Config& config,
 }
 
 TelemetryNeeds telemetry_needs(const Measured& measured, const Config& config,
-                               const NamedCalibration& calibration,
+                               const PublishedCalibration& calibration,
                                const OrientationStepOptions& step) {
   TelemetryNeeds needs;
   needs.source = measured.pan_tilt.name;
@@ -222,7 +222,7 @@ void print_report(const CheckReport& report, const VideoNeeds& video_needs) {
 }
 
 // Prints what is known before the measurement.
-void print_beginning(const std::string& configuration, const NamedCalibration& calibration) {
+void print_beginning(const std::string& configuration, const PublishedCalibration& calibration) {
   const Camera<double>& camera = calibration.calibration.camera;
   fmt::print("configuration  {}: ok\n", escaped(configuration));
   fmt::print("calibration    {}: {}focal length {:.1f} px, clock offset {} ms\n",

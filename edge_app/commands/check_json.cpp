@@ -115,7 +115,7 @@ Json motion_json(const std::optional<MotionReport>& motion) {
           {"clock_offset_s", or_null(motion->clock_offset_s)}};
 }
 
-Json scene_json(const SceneCheck& scene) {
+Json scene_check_json(const SceneCheck& scene) {
   if (scene.file.empty()) return nullptr;
   Json json{{"file", scene.file},
             {"error", scene.error.empty() ? Json() : Json(scene.error)},
@@ -150,7 +150,7 @@ std::string check_json(const CheckReport& report) {
   json["video"] = video_json(report);
   json["pan_tilt"] = pan_tilt_json(report);
   json["motion"] = motion_json(report.motion);
-  json["scene_map"] = scene_json(report.scene);
+  json["scene_map"] = scene_check_json(report.scene);
   json["mqtt"] = nullptr;
   if (!report.broker.empty()) {
     json["mqtt"] = {{"name", report.broker},

@@ -17,7 +17,7 @@ namespace alidade {
 
 struct CheckReport {
   std::string configuration;  // path
-  const NamedCalibration& calibration;
+  const PublishedCalibration& calibration;
   const Measured& measured;
   const VideoReport& video;
   const TelemetryReport& telemetry;

@@ -41,7 +41,7 @@ std::string why_not(const Localization& found) {
 
 }  // namespace
 
-SceneCheck check_scene(const Config& config, const NamedCalibration& calibration,
+SceneCheck check_scene(const Config& config, const PublishedCalibration& calibration,
                        const Measured& measured) {
   SceneCheck scene;
   // config.cpp has warned that mode PT does not use the map.

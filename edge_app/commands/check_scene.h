@@ -27,7 +27,7 @@ struct SceneCheck {
   Findings findings;
 };
 
-[[nodiscard]] SceneCheck check_scene(const Config& config, const NamedCalibration& calibration,
+[[nodiscard]] SceneCheck check_scene(const Config& config, const PublishedCalibration& calibration,
                                      const Measured& measured);
 
 // For the line "scene map": whether the map can be used.

@@ -47,8 +47,8 @@ VideoConfig require_video_config(const std::string& path) {
   return config.video;
 }
 
-NamedCalibration require_calibration_file(const std::string& path) {
-  NamedCalibration chosen;
+PublishedCalibration require_calibration_file(const std::string& path) {
+  PublishedCalibration chosen;
   std::string error;
   if (!load_calibration(path, &chosen.calibration, &error, &chosen.zoom_curve))
     throw CommandError(kExitUsage, error);
@@ -65,13 +65,13 @@ std::shared_ptr<const PlaneEstimate> require_plane(const Config& config) {
   return std::make_shared<const PlaneEstimate>(plane);
 }
 
-NamedCalibration choose_calibration(const Config& config) {
+PublishedCalibration choose_calibration(const Config& config) {
   const std::string& file = config.calibration.file;
   const bool not_yet = config.calibration.automatic && config.camera.focal_length_px &&
                        !std::filesystem::exists(file);
   const VideoConfig& video = config.video;
   if (!file.empty() && !not_yet) {
-    NamedCalibration chosen = require_calibration_file(file);
+    PublishedCalibration chosen = require_calibration_file(file);
     const Camera<double>& camera = chosen.calibration.camera;
     // The frames of a recording have their own size.
     if (!is_recording(config) && video.width > 0 &&
@@ -89,7 +89,9 @@ NamedCalibration choose_calibration(const Config& config) {
     spdlog::warn("{}: no calibration yet; the data sheet's camera is used",
                  file.empty() ? "calibration.file is not set" : file);
   }
-  NamedCalibration chosen{data_sheet_calibration(config.camera), false, "data sheet", {}};
+  PublishedCalibration chosen;
+  chosen.calibration = data_sheet_calibration(config.camera);
+  chosen.name = "data sheet";
   chosen.calibration.camera.width = video.width;
   chosen.calibration.camera.height = video.height;
   return chosen;
@@ -122,7 +124,7 @@ Calibration data_sheet_calibration(const CameraConfig& camera) {
   return calibration;
 }
 
-OrientationStepOptions step_options(const Config& config, const NamedCalibration& calibration) {
+OrientationStepOptions step_options(const Config& config, const PublishedCalibration& calibration) {
   OrientationStepOptions options = step_options(RecordingNoise{}, calibration);
   options.wait_for_pace = options.other_connection =
       config.video.type != VideoConfig::Type::kRecording;
@@ -136,7 +138,7 @@ OrientationStepOptions step_options(const Config& config, const NamedCalibration
 }
 
 OrientationStepOptions step_options(const RecordingNoise& noise,
-                                    const NamedCalibration& calibration) {
+                                    const PublishedCalibration& calibration) {
   const auto clock = [](std::optional<double> stamp_sigma_s, std::optional<double> period_s,
                         std::optional<double> period_sigma_s) {
     ClockFilterOptions options;

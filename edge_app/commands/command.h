@@ -10,6 +10,7 @@
 #include "core/ground/plane_estimate.h"
 #include "edge_app/config/config.h"
 #include "edge_app/config/noise_file.h"
+#include "edge_app/record/published_calibration.h"
 #include "edge_app/step/orientation_step.h"
 #include "platform/pan_tilt/pan_tilt_source.h"
 #include "platform/video/frame_source.h"
@@ -32,18 +33,12 @@ Config require_config(const std::string& path);
 // CommandError.
 VideoConfig require_video_config(const std::string& path);
 
-struct NamedCalibration {
-  Calibration calibration;
-  bool calibrated = false;  // false: the values of the data sheet
-  std::string name;         // for messages: the file, or "data sheet"
-  ZoomCurve zoom_curve;     // from the file; may be empty
-};
-
-NamedCalibration require_calibration_file(const std::string& path);
+// With its zoom curve, without a map. Throws CommandError.
+PublishedCalibration require_calibration_file(const std::string& path);
 
 // The calibration of calibration.file. The data sheet's if no file is named, or if calibration.auto
 // is set and the file does not exist yet. Throws CommandError.
-NamedCalibration choose_calibration(const Config& config);
+PublishedCalibration choose_calibration(const Config& config);
 
 // The ground plane that the configuration names; null if it names none. Throws CommandError.
 std::shared_ptr<const PlaneEstimate> require_plane(const Config& config);
@@ -53,9 +48,9 @@ std::shared_ptr<const PlaneEstimate> require_plane(const Config& config);
 Calibration data_sheet_calibration(const CameraConfig& camera);
 
 // With the noise that the configuration, or the noise.yaml of a recording, states.
-OrientationStepOptions step_options(const Config& config, const NamedCalibration& calibration);
+OrientationStepOptions step_options(const Config& config, const PublishedCalibration& calibration);
 OrientationStepOptions step_options(const RecordingNoise& noise,
-                                    const NamedCalibration& calibration);
+                                    const PublishedCalibration& calibration);
 
 // decode: frames have images. copy_to: the video stream is copied to this file; empty: none.
 std::unique_ptr<FrameSource> make_frame_source(const VideoConfig& config, bool decode,

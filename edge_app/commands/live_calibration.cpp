@@ -127,18 +127,17 @@ StartingCalibration load_starting_calibration(const Config& config, const std::s
     return start;
   }
   start.calibrating = begin_calibrating(config, path, use);
-  const auto first = start.calibrating.calibration->first();
-  start.calibration = {first->calibration, first->calibrated, first->name, first->zoom_curve};
-  start.map = first->map;
+  start.calibration = *start.calibrating.calibration->first();
   return start;
 }
 
-std::optional<NamedCalibration> calibration_at(const StartingCalibration& start, double zoom,
-                                               double tolerance) {
-  const NamedCalibration& first = start.calibration;
+std::optional<PublishedCalibration> calibration_at(const StartingCalibration& start, double zoom,
+                                                   double tolerance) {
+  const PublishedCalibration& first = start.calibration;
   const std::optional<double>& its = first.calibration.zoom;
   if (!its || std::abs(zoom - *its) <= tolerance) return first;
-  NamedCalibration there = first;
+  PublishedCalibration there = first;
+  there.map = {};
   CalibrationStore* store = start.calibrating.store.get();
   if (store != nullptr) {
     store->set_zoom_tolerance(tolerance);

@@ -23,8 +23,7 @@ struct Calibrating {
 // What `run` begins with and `check` examines.
 struct StartingCalibration {
   Calibrating calibrating;
-  NamedCalibration calibration;
-  MapState map;
+  PublishedCalibration calibration;  // with the stored map
 };
 
 // path: of the configuration, for errors. use: kLook changes no file. Throws CommandError if there
@@ -35,7 +34,7 @@ struct StartingCalibration {
 
 // The calibration that `run` has at once for a zoom reading; empty: none yet. tolerance: device
 // units; readings that differ by no more are one zoom.
-[[nodiscard]] std::optional<NamedCalibration> calibration_at(const StartingCalibration& start,
-                                                             double zoom, double tolerance);
+[[nodiscard]] std::optional<PublishedCalibration> calibration_at(const StartingCalibration& start,
+                                                                 double zoom, double tolerance);
 
 }  // namespace alidade

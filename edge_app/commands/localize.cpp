@@ -58,7 +58,7 @@ class Asking {
   void recording(const std::string& directory) {
     const MapRecording recording = load_map_recording(directory, !options_.no_telemetry);
     require_size(directory, recording.info.width, recording.info.height);
-    std::optional<NamedCalibration> calibration;
+    std::optional<PublishedCalibration> calibration;
     if (!options_.calibration.empty()) {
       calibration = require_calibration_file(options_.calibration);
     }

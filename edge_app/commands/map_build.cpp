@@ -31,7 +31,7 @@ struct Chosen {
   std::size_t frame;  // index into the views of that recording
 };
 
-std::optional<NamedCalibration> calibration_of(const MapBuildCommand& options) {
+std::optional<PublishedCalibration> calibration_of(const MapBuildCommand& options) {
   if (!options.calibration.empty()) return require_calibration_file(options.calibration);
   const fs::path beside = fs::path(options.recordings.front()) / "alidade" / "calibration.yaml";
   if (!fs::exists(beside)) return std::nullopt;

@@ -59,7 +59,7 @@ class OrientationFile {
   RecordWriter writer_;
 };
 
-NamedCalibration find_calibration(const ReplayOptions& options) {
+PublishedCalibration find_calibration(const ReplayOptions& options) {
   if (!options.calibration.empty()) return require_calibration_file(options.calibration);
   const fs::path beside = fs::path(options.recording) / "alidade" / "calibration.yaml";
   if (!fs::exists(beside)) {
@@ -73,7 +73,7 @@ NamedCalibration find_calibration(const ReplayOptions& options) {
   return require_calibration_file(beside.string());
 }
 
-void check_size(const RecordingInfo& info, const NamedCalibration& calibration,
+void check_size(const RecordingInfo& info, const PublishedCalibration& calibration,
                 const std::string& recording) {
   const Camera<double>& camera = calibration.calibration.camera;
   if (info.width == camera.width && info.height == camera.height) return;
@@ -201,7 +201,7 @@ int replay_recording(const ReplayOptions& options) {
   RecordingInfo info;
   if (!read_recording_info(options.recording, &info, &error))
     throw CommandError(kExitFailed, error);
-  const NamedCalibration calibration = find_calibration(options);
+  const PublishedCalibration calibration = find_calibration(options);
   check_size(info, calibration, options.recording);
   RecordingNoise noise;
   if (!load_noise(options.recording, &noise, &error)) throw CommandError(kExitFailed, error);

@@ -42,7 +42,7 @@ std::string describe(const RealtimeOptions& options) {
       options.lock_memory ? "locked" : "not locked");
 }
 
-PipelineOptions pipeline_options(const Config& config, const NamedCalibration& calibration) {
+PipelineOptions pipeline_options(const Config& config, const PublishedCalibration& calibration) {
   PipelineOptions options;
   options.step = step_options(config, calibration);
   options.step.has_telemetry = has_telemetry(config);
@@ -112,11 +112,11 @@ int run_live(const RunOptions& options) {
       throw CommandError(kExitFailed, error);
   }
   const std::shared_ptr<const PlaneEstimate> plane = require_plane(config);
-  auto [calibrating, calibration, map] =
+  auto [calibrating, calibration] =
       load_starting_calibration(config, options.config, CalibrationStore::Use::kKeep);
   spdlog::info("calibration: {}", calibration.name);
   PipelineOptions of_pipeline = pipeline_options(config, calibration);
-  of_pipeline.step.map = std::move(map);
+  of_pipeline.step.map = std::move(calibration.map);
   of_pipeline.step.follow_points = calibrating.calibration && config.calibration.automatic;
 
   std::optional<OutputFormat> format = config.output.stdout_format;

@@ -18,7 +18,7 @@ bool open_scene(const SceneMapConfig& config, int width, int height, SceneMapFil
 }
 
 std::unique_ptr<SceneLocalization> load_scene(const Config& config,
-                                              const NamedCalibration& calibration) {
+                                              const PublishedCalibration& calibration) {
   const Camera<double>& camera = calibration.calibration.camera;
   const SceneMapConfig& scene_map = config.scene_map;
   if (scene_map.file.empty() || !config.realtime.landmarks) return nullptr;

@@ -19,7 +19,7 @@ namespace alidade {
 
 // Null if no map is configured, the mode is PT, or the map cannot be used. Records then go on in
 // telemetry's base. Without telemetry a map that cannot be used throws CommandError.
-[[nodiscard]] std::unique_ptr<SceneLocalization> load_scene(const Config& config,
-                                                            const NamedCalibration& calibration);
+[[nodiscard]] std::unique_ptr<SceneLocalization> load_scene(
+    const Config& config, const PublishedCalibration& calibration);
 
 }  // namespace alidade

@@ -85,8 +85,7 @@ void use_tracks(VideoTracks tracks, CalibrationJob* job, std::vector<std::string
 }
 
 // Finds tracks, with a first estimate unless `estimate` is null, and calibrates with them.
-KnownCameraCalibration calibrate_video(const std::string& recording,
-                                       const CalibrationResult* estimate, CalibrationJob* job,
+KnownCameraCalibration calibrate_video(const CalibrationResult* estimate, CalibrationJob* job,
                                        std::vector<std::string>* remarks,
                                        VisibleProgress* progress) {
   const VideoProgress look = [progress, estimate](double done) {
@@ -95,8 +94,9 @@ KnownCameraCalibration calibrate_video(const std::string& recording,
     // Finding tracks takes nearly all of the time.
     if (!progress->show(kShareOfLooking * done, what)) throw progress->cancelled();
   };
-  VideoTracks tracks = estimate == nullptr ? track_video(recording, job->input, look)
-                                           : track_video(recording, job->input, *estimate, look);
+  VideoTracks tracks = estimate == nullptr
+                           ? track_video(job->recording, job->input, look)
+                           : track_video(job->recording, job->input, *estimate, look);
   *remarks = std::move(tracks.remarks);
   use_tracks(std::move(tracks), job, remarks);
   return calibrate_visibly(*job, kShareOfLooking, progress);
@@ -104,9 +104,8 @@ KnownCameraCalibration calibrate_video(const std::string& recording,
 
 }  // namespace
 
-CalibrationResult calibrate_job(const std::string& recording, int passes, CalibrationJob* job,
-                                StopSignals* signals) {
-  VisibleProgress progress(recording, signals);
+CalibrationResult calibrate_job(int passes, CalibrationJob* job, StopSignals* signals) {
+  VisibleProgress progress(job->recording, signals);
   std::vector<std::string> remarks;
   const auto finish = [&](KnownCameraCalibration calibrated) {
     for (const auto* said : {&remarks, &calibrated.remarks})
@@ -117,22 +116,21 @@ CalibrationResult calibrate_job(const std::string& recording, int passes, Calibr
   };
   if (!job->tracks_from_video) return finish(calibrate_visibly(*job, 0, &progress));
   progress.set_part(0, passes > 1 ? 0.5 : 1);
-  KnownCameraCalibration first = calibrate_video(recording, nullptr, job, &remarks, &progress);
+  KnownCameraCalibration first = calibrate_video(nullptr, job, &remarks, &progress);
   if (job->input.observations.empty()) {
     throw CommandError(
         kExitFailed,
         fmt::format(
             "{}: no point of the video could be followed through {} frames; film a far scene "
             "with texture, lit and in focus, that stays in view for that long",
-            recording, kMinSightings));
+            job->recording, kMinSightings));
   }
   const bool usable = first.result.ok() || first.result.status == CalibrationStatus::kWeak;
   if (passes > 1 && usable) {
     const std::vector<CalibrationObservation> first_tracks = job->input.observations;
     const auto first_untracked = job->untracked;
     progress.set_part(0.5, 1);
-    KnownCameraCalibration second =
-        calibrate_video(recording, &first.result, job, &remarks, &progress);
+    KnownCameraCalibration second = calibrate_video(&first.result, job, &remarks, &progress);
     if (second.result.ok() || !first.result.ok()) {
       first = std::move(second);
     } else {
@@ -146,12 +144,14 @@ CalibrationResult calibrate_job(const std::string& recording, int passes, Calibr
   return finish(std::move(first));
 }
 
-void track_movement(const std::string& recording, CalibrationJob* job, StopSignals* signals) {
+void track_movement(CalibrationJob* job, StopSignals* signals) {
   if (job->movement_pictures.frames.empty()) return;
-  VisibleProgress progress(recording, signals);
-  VideoTracks tracks = track_video(recording, job->movement_pictures, [&progress](double done) {
-    if (!progress.show(done, "following points while the zoom moves")) throw progress.cancelled();
-  });
+  VisibleProgress progress(job->recording, signals);
+  VideoTracks tracks =
+      track_video(job->recording, job->movement_pictures, [&progress](double done) {
+        if (!progress.show(done, "following points while the zoom moves"))
+          throw progress.cancelled();
+      });
   job->movement->input.observations = choose_tracks(std::move(tracks.observations));
 }
 

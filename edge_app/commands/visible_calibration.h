@@ -15,11 +15,11 @@ namespace alidade {
 // Calibrates. If the job has no tracks, they are found in the video first; with passes 2 they are
 // then found again with the first estimate. Leaves observations, remarks and the options used in
 // *job.
-[[nodiscard]] CalibrationResult calibrate_job(const std::string& recording, int passes,
-                                              CalibrationJob* job, StopSignals* signals);
+[[nodiscard]] CalibrationResult calibrate_job(int passes, CalibrationJob* job,
+                                              StopSignals* signals);
 
 // Finds the tracks of job->movement in job->movement_pictures.
-void track_movement(const std::string& recording, CalibrationJob* job, StopSignals* signals);
+void track_movement(CalibrationJob* job, StopSignals* signals);
 
 // map_video() with the progress shown.
 [[nodiscard]] MapState map_visibly(const std::string& recording, const CalibrationResult& result,

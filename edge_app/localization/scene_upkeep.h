@@ -1,6 +1,6 @@
 #pragma once
 // SceneUpkeep: keeps the scene map in use true by the pictures found in it
-// (core/mapping/map_upkeep.h), in memory and on disk. Each picture is one transaction, on disk when
+// (core/mapping/scene_map_upkeep.h), in memory and on disk. Each picture is one transaction, on disk when
 // show() returns: whatever ends the process costs no more than the present picture. If the disk
 // refuses, that is logged once and the upkeep ends; the map stays as it is on disk. The localizer's
 // index is of an earlier state of the map: is_due() says when a new one is worthwhile. One thread.
@@ -11,7 +11,7 @@
 
 #include "core/mapping/localization.h"
 #include "core/mapping/map_change.h"
-#include "core/mapping/map_upkeep.h"
+#include "core/mapping/scene_map_upkeep.h"
 #include "edge_app/step/scene_report.h"
 
 namespace alidade {
@@ -42,7 +42,7 @@ class SceneUpkeep {
   void stop(const std::string& error);
 
   StoreMapChange store_;
-  LandmarkUpkeep upkeep_;
+  SceneMapUpkeep upkeep_;
   int changed_ = 0;
   UpkeepReport report_;
 };

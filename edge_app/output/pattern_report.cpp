@@ -11,7 +11,7 @@
 #include "core/pattern/image_cells.h"
 #include "core/pattern/pattern_view.h"
 #include "edge_app/output/html_page.h"
-#include "edge_app/output/lens_rows.h"
+#include "edge_app/output/lens_table.h"
 #include "edge_app/output/report_page.h"
 #include "edge_app/output/svg_plot.h"
 
@@ -122,7 +122,7 @@ class PatternPage {
   void parameters() {
     add("<h2>Parameters</h2>\n<div class=\"scroll\"><table>\n<thead><tr><th>parameter</th>"
         "<th>value</th><th>sigma</th><th>unit</th></tr></thead>\n<tbody>\n");
-    for (const LensRow& row : lens_rows(report_.calibration)) {
+    for (const LensTableRow& row : lens_table(report_.calibration)) {
       add("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n", row.name, row.value, row.sigma,
           *row.unit == '\0' ? "1" : row.unit);
     }

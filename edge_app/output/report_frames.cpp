@@ -13,7 +13,7 @@ namespace alidade::report {
 namespace {
 
 // The times between two used frames that are clearly farther apart than usual.
-std::vector<Span> gaps_between(const std::vector<FrameResult>& frames, double start_s) {
+std::vector<TimeGap> gaps_between(const std::vector<FrameResult>& frames, double start_s) {
   constexpr double kUsual = 3.5;  // median intervals; a few lost frames are no gap
   std::vector<double> intervals;
   for (std::size_t i = 1; i < frames.size(); ++i) {
@@ -23,7 +23,7 @@ std::vector<Span> gaps_between(const std::vector<FrameResult>& frames, double st
   std::vector<double> sorted = intervals;
   const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
   std::nth_element(sorted.begin(), middle, sorted.end());
-  std::vector<Span> gaps;
+  std::vector<TimeGap> gaps;
   for (std::size_t i = 0; i < intervals.size(); ++i) {
     if (intervals[i] <= kUsual * *middle) continue;
     gaps.push_back({frames[i].time_s - start_s, frames[i + 1].time_s - start_s});
@@ -39,7 +39,7 @@ ReportPage::ReportPage(const CalibrationReportInput& report)
       gaps_(gaps_between(report.result.frames, start_s_)) {}
 
 void ReportPage::shade_gaps(SvgPlot* plot) const {
-  for (const Span& gap : gaps_) plot->shade(gap.begin_s, gap.end_s);
+  for (const TimeGap& gap : gaps_) plot->shade(gap.begin_s, gap.end_s);
 }
 
 void ReportPage::line_between_gaps(const std::vector<TimedPoint>& points, const char* colour,
@@ -108,7 +108,7 @@ std::vector<std::string> unused_frames(const ReportPage& page) {
         "telemetry's time span",
         counted(left_out, "frame")));
   }
-  for (const Span& gap : page.gaps()) {
+  for (const TimeGap& gap : page.gaps()) {
     constexpr std::size_t kMost = 8;  // lines
     if (lines.size() == kMost) {
       lines.emplace_back("and in further gaps, grey in the plots over time");

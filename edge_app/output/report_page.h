@@ -22,7 +22,7 @@ inline constexpr int kHalf_px = 510;   // one of two side by side
 inline constexpr double kDegrees = 180 / kPi;
 inline constexpr double kMilli = 1e3;  // s -> ms, rad -> mrad
 
-struct Span {
+struct TimeGap {
   double begin_s = 0;
   double end_s = 0;
 };
@@ -50,7 +50,7 @@ class ReportPage {
   // Time of the first frame, image clock. The page shows times relative to it.
   [[nodiscard]] double start_s() const { return start_s_; }
   // Times without used frames, relative to start_s().
-  [[nodiscard]] const std::vector<Span>& gaps() const { return gaps_; }
+  [[nodiscard]] const std::vector<TimeGap>& gaps() const { return gaps_; }
   // Shades the gaps in a plot over time. gap_note(): the text for its caption.
   void shade_gaps(SvgPlot* plot) const;
   [[nodiscard]] std::string gap_note() const {
@@ -74,7 +74,7 @@ class ReportPage {
  private:
   const CalibrationReportInput& report_;
   double start_s_;
-  std::vector<Span> gaps_;
+  std::vector<TimeGap> gaps_;
   std::string body_;
 };
 

@@ -7,7 +7,7 @@ namespace {
 
 constexpr double kFewPictures = 0.5;  // of those that the camera took
 
-CalibrationNeed need_of(const SessionCalibration& checked) {
+CalibrationNeed need_of(const CheckedCalibration& checked) {
   const CalibrationResult& result = checked.result;
   switch (result.status) {
     case CalibrationStatus::kNoMotion:
@@ -49,7 +49,7 @@ bool pictures_would_help(const CalibrationResult& result) {
 
 }  // namespace
 
-CalibrationRefusal why_refused(const SessionCalibration& checked, std::size_t frames) {
+CalibrationRefusal why_refused(const CheckedCalibration& checked, std::size_t frames) {
   const CalibrationResult& result = checked.result;
   const std::string why = fmt::format(" ({}): {}", to_string(result.status), checked.refusal);
   const double taken_up = share_taken_up(result, frames);

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "edge_app/record/published_calibration.h"
-#include "edge_app/self_calibration/session_calibration.h"
+#include "edge_app/self_calibration/checked_calibration.h"
 
 namespace alidade {
 
@@ -17,6 +17,6 @@ struct CalibrationRefusal {
 };
 
 // checked: must have a refusal. frames: the number of frames in its session.
-[[nodiscard]] CalibrationRefusal why_refused(const SessionCalibration& checked, std::size_t frames);
+[[nodiscard]] CalibrationRefusal why_refused(const CheckedCalibration& checked, std::size_t frames);
 
 }  // namespace alidade

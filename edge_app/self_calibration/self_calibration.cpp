@@ -159,8 +159,8 @@ bool SelfCalibration::adjusting_is_due() const {
              last_try_s_ + (clock_offset_known_ ? watch_interval_s_ : schedule.first_watch_s);
 }
 
-SessionCalibration SelfCalibration::adjust(const Calibration* known, bool free_centre) const {
-  SessionCalibrationOptions options;
+CheckedCalibration SelfCalibration::adjust(const Calibration* known, bool free_centre) const {
+  CheckedCalibrationOptions options;
   options.width = options_.data_sheet.camera.width;
   options.height = options_.data_sheet.camera.height;
   options.adjustment = options_.adjustment;
@@ -169,7 +169,7 @@ SessionCalibration SelfCalibration::adjust(const Calibration* known, bool free_c
   options.noise = options_.noise;
   options.checks = options_.checks;
   options.is_cancelled = [this] { return cancelled_.load(); };
-  SessionCalibration checked;
+  CheckedCalibration checked;
   if (known == nullptr) {
     checked = calibrate_session(session_, options, nullptr);
   } else {
@@ -193,7 +193,7 @@ void SelfCalibration::store(const CalibrationResult& result, const MapState& map
   if (!archive_->save(stored, &error)) messages_.push_back(error + "; kept, will be tried again");
 }
 
-void SelfCalibration::publish(const SessionCalibration& checked) {
+void SelfCalibration::publish(const CheckedCalibration& checked) {
   auto fresh = std::make_shared<PublishedCalibration>();
   fresh->calibration = checked.result.calibration;
   fresh->calibrated = true;
@@ -223,7 +223,7 @@ void SelfCalibration::publish(const SessionCalibration& checked) {
 // Calibrates without an earlier calibration as prior.
 void SelfCalibration::try_first() {
   ++tries_;
-  SessionCalibration checked = adjust(nullptr);
+  CheckedCalibration checked = adjust(nullptr);
   if (checked.refusal.empty()) {
     watch_interval_s_ = options_.schedule.first_watch_s;
     settle(std::move(checked));
@@ -239,7 +239,7 @@ void SelfCalibration::try_first() {
 void SelfCalibration::hold_against_published() {
   const CalibrationSchedule& schedule = options_.schedule;
   watch_interval_s_ = std::min(2 * watch_interval_s_, schedule.longest_watch_s);
-  SessionCalibration alone = adjust(nullptr);
+  CheckedCalibration alone = adjust(nullptr);
   // Insufficient motion says nothing against what is known.
   if (!alone.refusal.empty()) return;
   const double chi_square =
@@ -270,7 +270,7 @@ void SelfCalibration::hold_against_published() {
   }
   if (!first_node_ || !first_node_->refusal.empty()) first_node_is_wanted_ = true;
   alone = {};  // frees a megabyte
-  const SessionCalibration refined = adjust(&published_->calibration);
+  const CheckedCalibration refined = adjust(&published_->calibration);
   if (!refined.refusal.empty()) return;
   if (!clock_offset_known_ ||
       is_sharper(refined.result.calibration, published_->calibration, schedule.worth_publishing)) {

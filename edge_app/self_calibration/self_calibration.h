@@ -21,7 +21,7 @@
 #include "edge_app/self_calibration/calibration_archive.h"
 #include "edge_app/self_calibration/calibration_session.h"
 #include "edge_app/self_calibration/calibration_watch.h"
-#include "edge_app/self_calibration/session_calibration.h"
+#include "edge_app/self_calibration/checked_calibration.h"
 #include "edge_app/self_calibration/zoom_nodes.h"
 #include "edge_app/step/calibration_feed.h"
 #include "platform/pan_tilt/pan_tilt_source.h"
@@ -114,20 +114,20 @@ class SelfCalibration {
   [[nodiscard]] bool first_node_is_wanted() const { return first_node_is_wanted_ && !zooms_; }
   [[nodiscard]] bool first_node_is_due() const { return zooms_ && first_node_.has_value(); }
   // Calibrates the session. known: the published calibration as prior; null: from the data alone.
-  [[nodiscard]] SessionCalibration adjust(const Calibration* known, bool free_centre) const;
-  [[nodiscard]] SessionCalibration adjust(const Calibration* known) const {
+  [[nodiscard]] CheckedCalibration adjust(const Calibration* known, bool free_centre) const;
+  [[nodiscard]] CheckedCalibration adjust(const Calibration* known) const {
     return adjust(known, makes_nodes());
   }
   void make_first_node();
   void take_first_node();
   void try_first();
   void hold_against_published();
-  void settle(SessionCalibration checked);
-  void refine_node(SessionCalibration alone);
-  void take_node(const ZoomAddition& addition, SessionCalibration* checked);
-  void contradict_nodes(const SessionCalibration& alone, const std::string& why);
-  void begin_nodes_anew(const SessionCalibration& alone);
-  void publish(const SessionCalibration& checked);
+  void settle(CheckedCalibration checked);
+  void refine_node(CheckedCalibration alone);
+  void take_node(const ZoomAddition& addition, CheckedCalibration* checked);
+  void contradict_nodes(const CheckedCalibration& alone, const std::string& why);
+  void begin_nodes_anew(const CheckedCalibration& alone);
+  void publish(const CheckedCalibration& checked);
   void store(const CalibrationResult& result, const MapState& map);
   void say_once(const std::string& line);
 

@@ -14,7 +14,7 @@
 namespace alidade {
 namespace {
 
-ZoomFitOptions fit_options_of(const SessionCalibration& checked) {
+ZoomFitOptions fit_options_of(const CheckedCalibration& checked) {
   ZoomFitOptions options = zoom_fit_options(checked.adjustment);
   options.common_clock_sigma_s = checked.common_clock_sigma_s;
   return options;
@@ -152,7 +152,7 @@ void SelfCalibration::look_for_stored() {
 void SelfCalibration::make_first_node() {
   first_node_is_wanted_ = false;
   if (!zoom_) return;
-  const SessionCalibration made = adjust(nullptr, true);
+  const CheckedCalibration made = adjust(nullptr, true);
   if (made.result.status == CalibrationStatus::kCancelled) return;
   FirstNode node;
   node.refusal = made.refusal;
@@ -184,7 +184,7 @@ void SelfCalibration::take_first_node() {
 }
 
 // Called where there was no calibration, or a fresh one is wanted.
-void SelfCalibration::settle(SessionCalibration checked) {
+void SelfCalibration::settle(CheckedCalibration checked) {
   if (!makes_nodes()) {
     contradiction_.restart();
     publish(checked);
@@ -201,7 +201,7 @@ void SelfCalibration::settle(SessionCalibration checked) {
 }
 
 // Called where there is a calibration, and `alone` agrees with it.
-void SelfCalibration::refine_node(SessionCalibration alone) {
+void SelfCalibration::refine_node(CheckedCalibration alone) {
   ZoomAddition addition;
   std::string why;
   if (!nodes_.add(alone.result.calibration, fit_options_of(alone), &addition, &why)) {
@@ -216,7 +216,7 @@ void SelfCalibration::refine_node(SessionCalibration alone) {
   }
 }
 
-void SelfCalibration::take_node(const ZoomAddition& addition, SessionCalibration* checked) {
+void SelfCalibration::take_node(const ZoomAddition& addition, CheckedCalibration* checked) {
   if (!nodes_.has_visit()) watch_interval_s_ = options_.schedule.first_watch_s;
   nodes_.take(addition);
   contradiction_.restart();
@@ -231,7 +231,7 @@ void SelfCalibration::take_node(const ZoomAddition& addition, SessionCalibration
 }
 
 // Perhaps this reading alone is wrong: the other nodes are kept until a second one contradicts.
-void SelfCalibration::contradict_nodes(const SessionCalibration& alone, const std::string& why) {
+void SelfCalibration::contradict_nodes(const CheckedCalibration& alone, const std::string& why) {
   messages_.push_back(fmt::format("zoom {}: not of the zoom curve: {}", *zoom_, why));
   const auto verdict = contradiction_.judge(std::numeric_limits<double>::infinity());
   if (fresh_wanted_ || verdict == ContradictionJudge::Verdict::kBelieved) {
@@ -242,7 +242,7 @@ void SelfCalibration::contradict_nodes(const SessionCalibration& alone, const st
   }
 }
 
-void SelfCalibration::begin_nodes_anew(const SessionCalibration& alone) {
+void SelfCalibration::begin_nodes_anew(const CheckedCalibration& alone) {
   const std::string aside = archive_ == nullptr ? "" : archive_->set_zooms_aside();
   messages_.push_back(
       fmt::format("another camera or lens than the zoom curve's, or moved on its mount, or its "

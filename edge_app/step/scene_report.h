@@ -20,7 +20,7 @@ struct BaseOffset {
   double roll = 0;
 };
 
-// What keeping the map up has done since the start (core/mapping/map_upkeep.h).
+// What keeping the map up has done since the start (core/mapping/scene_map_upkeep.h).
 struct UpkeepReport {
   std::int64_t pictures = 0;     // given to it
   std::int64_t updates = 0;      // of the file, one transaction each

@@ -52,7 +52,7 @@ bool write_new(const std::string& path, const SceneMap& map, std::string* error)
     {
       SqliteTransaction transaction(&database, true);
       make_tables(&database);
-      write_all(map, 1, &database);
+      write_scene_map(map, 1, &database);
       written = transaction.commit();
     }
     database.execute("PRAGMA journal_mode = WAL");
@@ -172,7 +172,7 @@ bool SceneMapFile::replace(const SceneMap& map, std::string* error) {
                             "lens_point", "lens_knot", "scene"}) {
     database_.execute(std::string("DELETE FROM ") + table);
   }
-  write_all(map, scene_.revision + 1, &database_);
+  write_scene_map(map, scene_.revision + 1, &database_);
   if (!transaction.commit()) return refuse_failure(error);
   return read_scene(&scene_, error);
 }

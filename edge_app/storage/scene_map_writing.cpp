@@ -141,7 +141,7 @@ void write_lens(const LensCurve& lens, SqliteDatabase* database) {
 
 }  // namespace
 
-void write_all(const SceneMap& map, std::int64_t revision, SqliteDatabase* database) {
+void write_scene_map(const SceneMap& map, std::int64_t revision, SqliteDatabase* database) {
   SceneRow scene;
   scene.revision = revision;
   scene.width = map.lens.width();

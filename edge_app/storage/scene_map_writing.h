@@ -38,7 +38,7 @@ class SceneRows {
 };
 
 // Into empty tables of this program's format.
-void write_all(const SceneMap& map, std::int64_t revision, SqliteDatabase* database);
+void write_scene_map(const SceneMap& map, std::int64_t revision, SqliteDatabase* database);
 
 // with_rest: for the format that stores the lens's hold().
 [[nodiscard]] std::int64_t sum_of(const LensCurve& lens, bool with_rest);

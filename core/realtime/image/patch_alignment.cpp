@@ -15,7 +15,7 @@ using Points = ReferencePatch::Points;
 
 constexpr int kSize = kPatchSize;
 constexpr int kPoints = kSize * kSize;
-constexpr int kTaps = CubicSpline::kTaps;
+constexpr int kTaps = CubicBSpline::kTaps;
 constexpr int kSource = kSize + kTaps - 1;  // pixels under a patch, in each direction
 constexpr double kHalf = 0.5 * (kSize - 1);
 
@@ -51,8 +51,8 @@ Row blend(const float (&weight)[kTaps], const Row* rows) {
 template <bool kWithGradient>
 void sample_grid(const ImageView& image, const TapPlace& place, Points* value, Points* du,
                  Points* dv) {
-  const auto across = CubicSpline::taps(place.t_u);
-  const auto down = CubicSpline::taps(place.t_v);
+  const auto across = CubicBSpline::taps(place.t_u);
+  const auto down = CubicBSpline::taps(place.t_v);
   std::array<Row, kSource> lines;
   std::array<Row, kSource> slopes;
   for (int j = 0; j < kSource; ++j) {
@@ -159,7 +159,7 @@ PrepareStatus sample_reference(const ImageView& reference, const Vector2<double>
     for (int i = 0; i < kSize; ++i) {
       const Vector2<double> at = centre + A * Vector2<double>(i - kHalf, j - kHalf);
       Vector2<float> gradient;
-      if (sample<CubicSpline>(reference, at.x(), at.y(), &(*value)(j, i), &gradient) !=
+      if (sample<CubicBSpline>(reference, at.x(), at.y(), &(*value)(j, i), &gradient) !=
           SampleStatus::kOk) {
         return PrepareStatus::kOutOfImage;
       }

@@ -5,7 +5,7 @@
 // is exactly the derivative of the value.
 //   Bilinear      2x2  continuous; the gradient jumps at pixel centres
 //   CatmullRom    4x4  continuous gradient; interpolates the pixels
-//   CubicSpline   4x4  cubic B-spline without prefilter: blurs (standard deviation 0.58 px) almost
+//   CubicBSpline  4x4  cubic B-spline without prefilter: blurs (standard deviation 0.58 px) almost
 //                 equally at any position, does not interpolate the pixels
 // Points whose taps leave the image are refused. Pure functions. Position errors by kernel:
 // docs/measurements.md.
@@ -39,7 +39,7 @@ struct CatmullRom {
   }
 };
 
-struct CubicSpline {
+struct CubicBSpline {
   static constexpr int kTaps = 4;
   [[nodiscard]] static Taps<4> taps(float t) {
     const float s = 1 - t;

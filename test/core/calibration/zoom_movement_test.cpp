@@ -14,7 +14,7 @@
 #include "core/calibration/calibration_text.h"
 #include "core/calibration/zoom_fit.h"
 #include "test/support/simulated_recording.h"
-#include "test/support/zoom_nodes.h"
+#include "test/support/zoom_by_formula.h"
 
 namespace alidade {
 namespace {

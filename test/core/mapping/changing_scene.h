@@ -20,8 +20,8 @@
 #include <random>
 #include <vector>
 
-#include "core/mapping/map_upkeep.h"
 #include "core/mapping/picture_pose.h"
+#include "core/mapping/scene_map_upkeep.h"
 #include "test/simulator/lens.h"
 
 namespace alidade::test {
@@ -340,7 +340,7 @@ struct SceneDay {
 
 struct SceneRunOptions {
   bool upkeep = true;
-  UpkeepOptions options;
+  SceneMapUpkeepOptions options;
   // Stores the map: called first with the whole map and no change, then with each change before it is applied.
   // Returns the size of the store, bytes; none: it could not be stored, and the run ends.
   std::function<std::optional<std::int64_t>(const SceneMap& map, const MapChange& change)> keep;
@@ -351,7 +351,7 @@ inline std::vector<SceneDay> live_through(const ChangingSceneOptions& what,
                                           const SceneRunOptions& how) {
   ChangingScene scene(what);
   SceneMap map = scene.first_map(0.1, 0.05);
-  LandmarkUpkeep upkeep(how.options);
+  SceneMapUpkeep upkeep(how.options);
   PoseKnowledge knowledge;
   knowledge.lens = map.lens;
   knowledge.least_log_f = std::log(1000.0);

@@ -114,7 +114,7 @@ TEST(ImageCheck, MeasuresLight) {
   Image image = even(100);
   std::fill(image.pixels.begin(), image.pixels.begin() + kWidth * kHeight / 4, std::uint8_t{255});
   std::fill(image.pixels.end() - kWidth * kHeight / 2, image.pixels.end(), std::uint8_t{3});
-  const Light light = measure_light(image.view());
+  const ImageLight light = measure_light(image.view());
   EXPECT_NEAR(light.saturated, 0.25, 1e-9);
   EXPECT_NEAR(light.dark, 0.5, 1e-9);
   EXPECT_NEAR(light.mean, 0.25 * 255 + 0.25 * 100 + 0.5 * 3, 1e-6);

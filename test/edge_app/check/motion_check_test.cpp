@@ -66,7 +66,7 @@ struct Scene {
     needs.turn_image = "TURN";
   }
 
-  [[nodiscard]] MotionReport check() const { return check_motion(shifts, samples, needs); }
+  [[nodiscard]] MotionReport check() const { return check_measured_motion(shifts, samples, needs); }
 };
 
 TEST(MotionCheck, FindsSignsFocalLengthAndOffset) {
@@ -225,11 +225,12 @@ TEST(MotionCheck, NoticesAImageThatStandsStill) {
 }
 
 TEST(MotionCheck, BearsHardlyAnythingAndNonsense) {
-  EXPECT_THAT(check_motion({}, {}, MotionNeeds()).findings, IsEmpty());
+  EXPECT_THAT(check_measured_motion({}, {}, MotionNeeds()).findings, IsEmpty());
   const Scene scene(wander);
-  EXPECT_THAT(check_motion(scene.shifts, {}, scene.needs).findings, IsEmpty());
-  EXPECT_THAT(check_motion({}, scene.samples, scene.needs).findings, IsEmpty());
-  EXPECT_THAT(check_motion({scene.shifts[0]}, {scene.samples[0]}, scene.needs).findings, IsEmpty());
+  EXPECT_THAT(check_measured_motion(scene.shifts, {}, scene.needs).findings, IsEmpty());
+  EXPECT_THAT(check_measured_motion({}, scene.samples, scene.needs).findings, IsEmpty());
+  EXPECT_THAT(check_measured_motion({scene.shifts[0]}, {scene.samples[0]}, scene.needs).findings,
+              IsEmpty());
   Scene spoilt(wander);
   for (std::size_t i = 0; i < 250; i += 50) {
     spoilt.shifts[i].shift[0] = kNan;

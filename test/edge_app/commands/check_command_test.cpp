@@ -23,7 +23,7 @@
 #include "test/platform/support/rtp_sender.h"
 #include "test/support/temporary_directory.h"
 #include "test/support/udp_port_pair.h"
-#include "test/support/zoom_nodes.h"
+#include "test/support/zoom_by_formula.h"
 
 namespace alidade {
 namespace {

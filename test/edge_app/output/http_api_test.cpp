@@ -15,7 +15,7 @@
 #include "edge_app/output/detection_query.h"
 #include "test/edge_app/output/http_client.h"
 #include "test/edge_app/tracking/detected_scene.h"
-#include "test/support/zoom_nodes.h"
+#include "test/support/zoom_by_formula.h"
 
 namespace alidade {
 namespace {

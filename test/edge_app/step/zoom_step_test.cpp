@@ -13,7 +13,7 @@
 #include "edge_app/step/orientation_step.h"
 #include "edge_app/step/zoom_lookup.h"
 #include "test/support/allocation_guard.h"
-#include "test/support/zoom_nodes.h"
+#include "test/support/zoom_by_formula.h"
 
 namespace alidade {
 namespace {

@@ -16,7 +16,7 @@
 #include "edge_app/storage/calibration_file.h"
 #include "edge_app/storage/map_file.h"
 #include "test/support/temporary_directory.h"
-#include "test/support/zoom_nodes.h"
+#include "test/support/zoom_by_formula.h"
 
 namespace alidade {
 namespace {

@@ -104,14 +104,27 @@ TEST(PelcoDProtocol, SaysWhatCameInsteadOfAnAnswer) {
   EXPECT_THAT(problem, HasSubstr("no answer of Pelco-D"));
 }
 
-TEST(PelcoDProtocol, SurvivesRandomBytes) {
+TEST(PelcoDProtocol, FindsTheLatestWholeAnswerBetweenRandomBytesAndNoneThatIsCutOff) {
   std::mt19937 random(1);
-  for (int i = 0; i < 2000; ++i) {
-    std::string bytes(random() % kMaxAnswer, '\0');
+  const auto noise = [&random] {
+    std::string bytes(random() % (kMaxAnswer / 2), '\0');
     for (char& c : bytes) {
       c = static_cast<char>(random() % 3 == 0 ? 0xFF : random());
     }
-    static_cast<void>(find(bytes));
+    return bytes;
+  };
+  for (int i = 0; i < 2000; ++i) {
+    const int value = static_cast<int>(random() % 65536);
+    const std::string before = noise();
+    const std::string answer = answer_of(1, kPanAnswer, value);
+    const auto found = find(before + answer + noise());
+    ASSERT_TRUE(found) << i;
+    ASSERT_EQ(found->begin, before.size()) << i;
+    ASSERT_EQ(found->value, value) << i;
+
+    std::string problem;
+    ASSERT_FALSE(find(before + answer.substr(0, 6), &problem)) << i;
+    ASSERT_EQ(problem.empty(), before.empty()) << i;
   }
 }
 

@@ -100,17 +100,58 @@ TEST(ViscaProtocol, ReadsZoomAndErrors) {
   }
 }
 
-TEST(ViscaProtocol, SurvivesRandomBytes) {
+TEST(ViscaProtocol, FindsTheLatestWholeFrameBetweenRandomBytes) {
   std::mt19937 random(2);
   constexpr int kLikely[] = {0xFF, 0x90, 0x50, 0x61, 0x00, 0x0F, 0x01};
-  for (int i = 0; i < 2000; ++i) {
-    std::string bytes(random() % kMaxAnswer, '\0');
+  const std::string answer = bytes_of({0x90, 0x50, 0, 0, 0, 5, 0, 0, 0, 6, 0xFF});
+  const auto noise = [&] {
+    std::string bytes(random() % (kMaxAnswer / 2), '\0');
     for (char& c : bytes) {
       c = static_cast<char>(random() % 2 == 0 ? kLikely[random() % 7] : static_cast<int>(random()));
     }
-    static_cast<void>(find_visca_frame(bytes, 1));
-    static_cast<void>(parse_visca_header(bytes));
+    return bytes;
+  };
+  int later = 0;
+  for (int i = 0; i < 2000; ++i) {
+    const std::string before = noise();
+    const std::string bytes = before + answer + noise();
+    const auto found = find_visca_frame(bytes, 1);
+    ASSERT_TRUE(found) << i;
+    ASSERT_GE(found->begin, before.size()) << i;
+    ASSERT_LE(found->begin + found->length, bytes.size()) << i;
+    // FF ends every frame and occurs nowhere else in it.
+    ASSERT_EQ(bytes[found->begin], '\x90') << i;
+    ASSERT_EQ(bytes.find('\xFF', found->begin), found->begin + found->length - 1) << i;
+    if (found->begin == before.size()) {
+      ASSERT_EQ(found->kind, ViscaFrame::Kind::kPosition) << i;
+      ASSERT_EQ(found->pan, 5) << i;
+      ASSERT_EQ(found->tilt, 6) << i;
+    } else {
+      ++later;  // a short frame, by chance
+    }
   }
+  EXPECT_LT(later, 1000);
+}
+
+TEST(ViscaProtocol, TakesRandomBytesForADatagramOnlyIfTheirLengthIsTheOneTheyState) {
+  std::mt19937 random(3);
+  int taken = 0;
+  for (int i = 0; i < 2000; ++i) {
+    std::string bytes(random() % kMaxAnswer, '\0');
+    for (char& c : bytes) c = static_cast<char>(random());
+    const std::size_t stated = bytes.size() - 8 + random() % 2;
+    if (bytes.size() > 8) {
+      bytes[2] = static_cast<char>(stated / 256);
+      bytes[3] = static_cast<char>(stated % 256);
+    }
+    const auto header = parse_visca_header(bytes);
+    ASSERT_EQ(header.has_value(), bytes.size() > 8 && stated == bytes.size() - 8) << i;
+    if (header) {
+      ASSERT_EQ(header->payload, bytes.substr(8)) << i;
+      ++taken;
+    }
+  }
+  EXPECT_GT(taken, 500);
 }
 
 ViscaOptions options() {

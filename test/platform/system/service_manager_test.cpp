@@ -95,14 +95,20 @@ TEST_F(ServiceManagerTest, IsNotThereWithoutASocket) {
   manager.ready();
 }
 
-TEST_F(ServiceManagerTest, ThatHasGoneHarmsNobody) {
+TEST_F(ServiceManagerTest, ThatHasGoneLosesMessagesAndHearsTheNextOnesWhenItIsBack) {
   listen();
   ::setenv("WATCHDOG_USEC", "3000000", 1);
   const ServiceManager manager;
   ::close(socket_);
-  socket_ = -1;
   manager.alive();
   manager.stopping();
+  ASSERT_EQ(::unlink((directory_.path() + "/notify").c_str()), 0);
+  manager.status("nobody listens");
+  listen();
+  EXPECT_EQ(heard(), "");
+  manager.alive();
+  EXPECT_EQ(heard(), "WATCHDOG=1");
+  EXPECT_EQ(heard(), "");
 }
 
 }  // namespace

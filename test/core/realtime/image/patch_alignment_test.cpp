@@ -92,7 +92,7 @@ double correlation_of_blur(int k) {
   constexpr int kFractions = 64;
   double sum = 0;
   for (int n = 0; n < kFractions; ++n) {
-    const auto taps = CubicSpline::taps(static_cast<float>((n + 0.5) / kFractions));
+    const auto taps = CubicBSpline::taps(static_cast<float>((n + 0.5) / kFractions));
     for (int i = 0; i + k < 4; ++i) {
       sum += static_cast<double>(taps.weight[static_cast<std::size_t>(i)]) *
              static_cast<double>(taps.weight[static_cast<std::size_t>(i + k)]) / kFractions;

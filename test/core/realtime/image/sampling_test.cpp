@@ -14,7 +14,7 @@ namespace {
 
 template <class Kernel>
 class Sampling : public testing::Test {};
-using Kernels = testing::Types<Bilinear, CatmullRom, CubicSpline>;
+using Kernels = testing::Types<Bilinear, CatmullRom, CubicBSpline>;
 TYPED_TEST_SUITE(Sampling, Kernels, );
 
 TYPED_TEST(Sampling, IsExactOnARampAtPixelCoordinates) {
@@ -75,7 +75,7 @@ double plain_sample(const ImageView& image, double u, double v) {
 
 template <class Kernel>
 class VectorSampling : public testing::Test {};
-using FourTaps = testing::Types<CatmullRom, CubicSpline>;
+using FourTaps = testing::Types<CatmullRom, CubicBSpline>;
 TYPED_TEST_SUITE(VectorSampling, FourTaps, );
 
 TYPED_TEST(VectorSampling, EqualsTheScalarSumToTheRoundingOfFloats) {
@@ -138,14 +138,14 @@ TEST(SamplingDisplacement, IsSmallestForTheSplineThatBlurs) {
   for (const double period : {4.0, 6.0, 8.0, 12.0}) {
     const double bilinear = worst_displacement<Bilinear>(period);
     const double catmull_rom = worst_displacement<CatmullRom>(period);
-    const double spline = worst_displacement<CubicSpline>(period);
+    const double spline = worst_displacement<CubicBSpline>(period);
     RecordProperty("period_" + std::to_string(static_cast<int>(period)),
                    std::to_string(bilinear) + " " + std::to_string(catmull_rom) + " " +
                        std::to_string(spline));
     EXPECT_LT(spline, catmull_rom);
     EXPECT_LT(spline, bilinear / 5);
   }
-  EXPECT_LT(worst_displacement<CubicSpline>(4), 0.01);
+  EXPECT_LT(worst_displacement<CubicBSpline>(4), 0.01);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "core/mapping/map_upkeep.h"
+#include "core/mapping/scene_map_upkeep.h"
 
 #include <gtest/gtest.h>
 
@@ -83,7 +83,7 @@ class UpkeepTest : public ::testing::Test {
 
   Matrix3<double> R = r_frd_from_rdf<double>();
   SceneMap map;
-  LandmarkUpkeep upkeep;
+  SceneMapUpkeep upkeep;
   UpkeepCounts counts;
 };
 
@@ -229,7 +229,7 @@ TEST_F(UpkeepTest, ManyThatAreGoneDoNotHideTheirOwnDeath) {
   }
   EXPECT_GT(map.landmarks.size(), 120U);
   // Another program goes on with the map.
-  upkeep = LandmarkUpkeep();
+  upkeep = SceneMapUpkeep();
   for (int i = 0; i < 150; ++i, t += 3600) show(grid(), {}, t);
   EXPECT_EQ(map.landmarks.size(), 24U);
 }
@@ -244,9 +244,9 @@ TEST_F(UpkeepTest, ACellHoldsSoManyAndTheLeastUsefulGoes) {
 }
 
 TEST_F(UpkeepTest, AFullMapGivesUpTheLeastUseful) {
-  UpkeepOptions options;
+  SceneMapUpkeepOptions options;
   options.most_landmarks = 24;
-  upkeep = LandmarkUpkeep(options);
+  upkeep = SceneMapUpkeep(options);
   map.landmarks[10].life.matched = 1;
   std::set<std::int64_t> others = grid();
   others.erase(11);
@@ -358,7 +358,7 @@ TEST(SphereCell, ARingHasAsManyCellsAsItsAreaHolds) {
   }
 }
 
-TEST(LandmarkUpkeep, TwoDaysLeaveTheDirectionWhereItWas) {
+TEST(SceneMapUpkeep, TwoDaysLeaveTheDirectionWhereItWas) {
   ChangingSceneOptions what;
   what.days = 2;
   what.places = 1;

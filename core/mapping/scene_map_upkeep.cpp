@@ -1,4 +1,4 @@
-#include "core/mapping/map_upkeep.h"
+#include "core/mapping/scene_map_upkeep.h"
 
 #include <algorithm>
 #include <cmath>
@@ -51,7 +51,7 @@ double usual_share(const LandmarkLife& life) {
 
 }  // namespace
 
-bool UpkeepOptions::validate(const char** error) const {
+bool SceneMapUpkeepOptions::validate(const char** error) const {
   const auto refuse = [&](const char* what) {
     if (error != nullptr) *error = what;
     return false;
@@ -80,7 +80,7 @@ bool UpkeepOptions::validate(const char** error) const {
   return true;
 }
 
-double UpkeepOptions::sigma_of(double scale_px) const {
+double SceneMapUpkeepOptions::sigma_of(double scale_px) const {
   return sigma_px * std::max(1.0, scale_px / kFinestScale_px);
 }
 
@@ -109,7 +109,7 @@ void average_descriptor(const Descriptor& seen, double weight, std::uint64_t sal
   }
 }
 
-MapChange LandmarkUpkeep::show(const UpkeepView& view, const SceneMap& map, UpkeepCounts* counts) {
+MapChange SceneMapUpkeep::show(const UpkeepView& view, const SceneMap& map, UpkeepCounts* counts) {
   UpkeepCounts ignored;
   UpkeepCounts& count = counts != nullptr ? *counts : ignored;
   count = {};
@@ -128,7 +128,7 @@ MapChange LandmarkUpkeep::show(const UpkeepView& view, const SceneMap& map, Upke
   return change;
 }
 
-bool LandmarkUpkeep::look(const UpkeepView& view, const SceneMap& map, Picture* picture) const {
+bool SceneMapUpkeep::look(const UpkeepView& view, const SceneMap& map, Picture* picture) const {
   if (!valid_ || view.features == nullptr || !view.R_base_from_camera.allFinite() ||
       !std::isfinite(view.log_f) || !view.covariance.allFinite() ||
       !view.motion.angular_velocity.allFinite() || !std::isfinite(view.motion.zoom_rate) ||
@@ -203,7 +203,7 @@ bool LandmarkUpkeep::look(const UpkeepView& view, const SceneMap& map, Picture* 
   return true;
 }
 
-bool LandmarkUpkeep::follow_one(const Feature& seen, const Descriptor& descriptor, double now_utc_s,
+bool SceneMapUpkeep::follow_one(const Feature& seen, const Descriptor& descriptor, double now_utc_s,
                                 const Picture& picture, SceneLandmark* landmark) const {
   LandmarkState state{landmark->d_b, landmark->covariance, landmark->shared_covariance};
   const double unseen_s = std::max(0.0, now_utc_s - landmark->life.last_seen_utc_s);
@@ -231,7 +231,7 @@ bool LandmarkUpkeep::follow_one(const Feature& seen, const Descriptor& descripto
   return true;
 }
 
-void LandmarkUpkeep::follow(const UpkeepView& view, const SceneMap& map, Picture* picture,
+void SceneMapUpkeep::follow(const UpkeepView& view, const SceneMap& map, Picture* picture,
                             UpkeepCounts* counts) {
   for (const UpkeepMatch& match : view.matches) {
     const auto feature = static_cast<std::size_t>(match.feature);
@@ -246,7 +246,7 @@ void LandmarkUpkeep::follow(const UpkeepView& view, const SceneMap& map, Picture
   }
 }
 
-void LandmarkUpkeep::judge(const UpkeepView& view, const SceneMap& map, Picture* picture,
+void SceneMapUpkeep::judge(const UpkeepView& view, const SceneMap& map, Picture* picture,
                            MapChange* change, UpkeepCounts* counts) {
   double usual = 0;
   int found = 0;

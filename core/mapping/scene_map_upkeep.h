@@ -1,5 +1,5 @@
 #pragma once
-// LandmarkUpkeep: keeps a scene map up to date while it is used (Lisanti et al., section 3.3). It
+// SceneMapUpkeep: keeps a scene map up to date while it is used (Lisanti et al., section 3.3). It
 // is shown each picture whose pose was found from the map, and returns a change of the map:
 // landmarks that were seen (landmark_filter.h, descriptors by a running average), born or dead.
 // Bounded: cells of the sphere, of a size that goes with the landmark's, hold so many landmarks
@@ -16,7 +16,7 @@
 
 namespace alidade {
 
-struct UpkeepOptions {
+struct SceneMapUpkeepOptions {
   // Detection
   double sigma_px = 0.2;  // px; of a feature of scale 1.6 px, each coordinate; grows with the scale
   // Least sigma of a landmark's own direction at the focal length it was seen with. More pictures
@@ -83,17 +83,17 @@ struct UpkeepCounts {
   bool refused = false;     // numbers or indices out of range: nothing was done
 };
 
-class LandmarkUpkeep {
+class SceneMapUpkeep {
  public:
   // With options that validate() refuses, show() refuses everything.
-  explicit LandmarkUpkeep(const UpkeepOptions& options = {})
+  explicit SceneMapUpkeep(const SceneMapUpkeepOptions& options = {})
       : options_(options), valid_(options.validate()) {}
 
   // The change of the map by a picture; apply() it before the next one.
   [[nodiscard]] MapChange show(const UpkeepView& view, const SceneMap& map,
                                UpkeepCounts* counts = nullptr);
 
-  [[nodiscard]] const UpkeepOptions& options() const { return options_; }
+  [[nodiscard]] const SceneMapUpkeepOptions& options() const { return options_; }
   [[nodiscard]] int candidates() const { return static_cast<int>(candidates_.size()); }
 
  private:
@@ -113,7 +113,7 @@ class LandmarkUpkeep {
   void give_birth(const std::vector<SceneLandmark>& ready, double now_utc_s, const SceneMap& map,
                   Picture* picture, MapChange* change, UpkeepCounts* counts);
 
-  UpkeepOptions options_;
+  SceneMapUpkeepOptions options_;
   bool valid_;
   std::vector<Candidate> candidates_;
 };

@@ -1,4 +1,4 @@
-#include "edge_app/self_calibration/session_calibration.h"
+#include "edge_app/self_calibration/checked_calibration.h"
 
 #include <fmt/format.h>
 
@@ -103,8 +103,8 @@ std::string refusal_of(const CalibrationQuality& quality, double hold_out, doubl
 
 }  // namespace
 
-SessionCalibration calibrate_session(const CalibrationSession& session,
-                                     const SessionCalibrationOptions& options,
+CheckedCalibration calibrate_session(const CalibrationSession& session,
+                                     const CheckedCalibrationOptions& options,
                                      const KnownCalibration* known) {
   CalibrationInput input;
   input.width = options.width;
@@ -125,7 +125,7 @@ SessionCalibration calibrate_session(const CalibrationSession& session,
   input.observations = choose_tracks(session.observations(), options.max_observations);
   const std::vector<CalibrationObservation> held_out = take_held_out(stamps, &input.observations);
 
-  SessionCalibration checked;
+  CheckedCalibration checked;
   // A published calibration already contains what is known of the camera.
   KnownCameraCalibration calibrated =
       calibrate_knowing(input, adjustment, known == nullptr ? options.camera : KnownCamera());

@@ -1,6 +1,6 @@
 // A session's calibration is tried on the frames that it did not use: what they say reaches its sigmas, or refuses it.
 
-#include "edge_app/self_calibration/session_calibration.h"
+#include "edge_app/self_calibration/checked_calibration.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -55,15 +55,15 @@ CalibrationSession session_of(const test::Simulation& s, double held_out_factor,
   return session;
 }
 
-SessionCalibrationOptions session_options(const test::Simulation& s) {
-  SessionCalibrationOptions options;
+CheckedCalibrationOptions session_options(const test::Simulation& s) {
+  CheckedCalibrationOptions options;
   options.width = s.width;
   options.height = s.height;
   options.noise.pan_tilt_sigma_rad = s.pan_tilt_sigma;
   return options;
 }
 
-SessionCalibration calibrated(double held_out_factor, const Calibration* known = nullptr) {
+CheckedCalibration calibrated(double held_out_factor, const Calibration* known = nullptr) {
   const test::Simulation s = test::arrival_stamped_camera();
   const CalibrationSession session = session_of(s, held_out_factor);
   if (known == nullptr) return calibrate_session(session, session_options(s), nullptr);
@@ -71,14 +71,14 @@ SessionCalibration calibrated(double held_out_factor, const Calibration* known =
   return calibrate_session(session, session_options(s), &prior);
 }
 
-double excess_of(const SessionCalibration& checked) {
+double excess_of(const CheckedCalibration& checked) {
   return std::max(1.0, checked.hold_out / std::max(1.0, checked.result.quality.pixel_sigma_ratio));
 }
 
 // The sigmas of frames that the adjustment does not see cannot change it: only what these frames say does.
-TEST(SessionCalibration, SigmasGrowAsMuchAsHeldOutFramesLieFartherOffThanTheyClaim) {
-  const SessionCalibration honest = calibrated(1);
-  const SessionCalibration off = calibrated(0.6);
+TEST(CheckedCalibration, SigmasGrowAsMuchAsHeldOutFramesLieFartherOffThanTheyClaim) {
+  const CheckedCalibration honest = calibrated(1);
+  const CheckedCalibration off = calibrated(0.6);
   ASSERT_THAT(honest.refusal, IsEmpty());
   ASSERT_THAT(off.refusal, IsEmpty());
   ASSERT_EQ(off.result.calibration.camera.focal_length,
@@ -92,9 +92,9 @@ TEST(SessionCalibration, SigmasGrowAsMuchAsHeldOutFramesLieFartherOffThanTheyCla
   }
 }
 
-TEST(SessionCalibration, SigmasDoNotShrinkWhereHeldOutFramesFitBetterThanTheyClaim) {
-  const SessionCalibration honest = calibrated(1);
-  const SessionCalibration modest = calibrated(3);
+TEST(CheckedCalibration, SigmasDoNotShrinkWhereHeldOutFramesFitBetterThanTheyClaim) {
+  const CheckedCalibration honest = calibrated(1);
+  const CheckedCalibration modest = calibrated(3);
   ASSERT_LT(modest.hold_out, 0.5);
   EXPECT_LE(modest.result.calibration.covariance(0, 0), honest.result.calibration.covariance(0, 0));
   EXPECT_NEAR(modest.result.calibration.covariance(0, 0) * excess_of(honest) * excess_of(honest),
@@ -102,50 +102,50 @@ TEST(SessionCalibration, SigmasDoNotShrinkWhereHeldOutFramesFitBetterThanTheyCla
               1e-9 * honest.result.calibration.covariance(0, 0));
 }
 
-TEST(SessionCalibration, IsRefusedWhereHeldOutFramesContradictIt) {
-  const SessionCalibration off = calibrated(0.2);
+TEST(CheckedCalibration, IsRefusedWhereHeldOutFramesContradictIt) {
+  const CheckedCalibration off = calibrated(0.2);
   EXPECT_TRUE(off.result.ok());
   EXPECT_GT(off.hold_out, 2);
   EXPECT_THAT(off.refusal, HasSubstr("held out"));
 }
 
-TEST(SessionCalibration, WhatIsKnownMakesItSharper) {
-  const SessionCalibration first = calibrated(1);
-  const SessionCalibration refined = calibrated(1, &first.result.calibration);
+TEST(CheckedCalibration, WhatIsKnownMakesItSharper) {
+  const CheckedCalibration first = calibrated(1);
+  const CheckedCalibration refined = calibrated(1, &first.result.calibration);
   ASSERT_THAT(refined.refusal, IsEmpty());
   const int f = index(Parameter::kFocalLength);
   EXPECT_LT(refined.result.calibration.covariance(f, f), first.result.calibration.covariance(f, f));
 }
 
-TEST(SessionCalibration, TakesWhatIsKnownOfTheCameraBeforehandOnceAndSaysWhatContradicts) {
+TEST(CheckedCalibration, TakesWhatIsKnownOfTheCameraBeforehandOnceAndSaysWhatContradicts) {
   const test::Simulation s = test::arrival_stamped_camera();
   const CalibrationSession session = session_of(s, 1);
-  SessionCalibrationOptions options = session_options(s);
-  const SessionCalibration alone = calibrate_session(session, options, nullptr);
+  CheckedCalibrationOptions options = session_options(s);
+  const CheckedCalibration alone = calibrate_session(session, options, nullptr);
   ASSERT_THAT(alone.refusal, IsEmpty());
   const double sigma = std::sqrt(alone.result.calibration.covariance(index(Parameter::kLineDelay),
                                                                      index(Parameter::kLineDelay)));
   options.camera.name = "lens.yaml";
   options.camera.line_delay = {{s.line_delay, 0.1 * sigma}, true};
-  const auto sigma_of = [](const SessionCalibration& c) {
+  const auto sigma_of = [](const CheckedCalibration& c) {
     return std::sqrt(c.result.calibration.covariance(index(Parameter::kLineDelay),
                                                      index(Parameter::kLineDelay)));
   };
-  const SessionCalibration sharp = calibrate_session(session, options, nullptr);
+  const CheckedCalibration sharp = calibrate_session(session, options, nullptr);
   EXPECT_THAT(sharp.remarks, IsEmpty());
   EXPECT_LT(sigma_of(sharp), 0.15 * sigma);
   // What is published holds it already.
   const KnownCalibration published{alone.result.calibration, true};
   EXPECT_GT(sigma_of(calibrate_session(session, options, &published)), 0.5 * sigma);
   options.camera.line_delay.prior.value += 20 * sigma;
-  const SessionCalibration contradicted = calibrate_session(session, options, nullptr);
+  const CheckedCalibration contradicted = calibrate_session(session, options, nullptr);
   EXPECT_THAT(contradicted.remarks,
               ::testing::ElementsAre(HasSubstr("lens.yaml: line delay contradicts")));
   EXPECT_EQ(contradicted.result.calibration.line_delay, alone.result.calibration.line_delay);
 }
 
 // The known offset errs by it as much as the new data do, and so says the more of the rest.
-TEST(SessionCalibration, WhatAllPollsHaveInCommonDoesNotWeakenAKnownClockOffset) {
+TEST(CheckedCalibration, WhatAllPollsHaveInCommonDoesNotWeakenAKnownClockOffset) {
   constexpr double kWidth_s = 0.02;
   const test::Simulation s = test::arrival_stamped_camera();
   const CalibrationSession session = session_of(s, 1, kWidth_s);
@@ -159,7 +159,7 @@ TEST(SessionCalibration, WhatAllPollsHaveInCommonDoesNotWeakenAKnownClockOffset)
     return calibrate_session(session, session_options(s), &prior);
   };
   constexpr double kMoved_s = 1e-3;
-  const SessionCalibration later = refined(kMoved_s);
+  const CheckedCalibration later = refined(kMoved_s);
   const double share =
       (later.result.calibration.clock_offset - refined(-kMoved_s).result.calibration.clock_offset) /
       (2 * kMoved_s);
@@ -171,12 +171,12 @@ TEST(SessionCalibration, WhatAllPollsHaveInCommonDoesNotWeakenAKnownClockOffset)
   EXPECT_NEAR(share, variance / known_variance, 0.3 * share);
 }
 
-TEST(SessionCalibration, EndsSoonWhenItIsCancelled) {
+TEST(CheckedCalibration, EndsSoonWhenItIsCancelled) {
   const test::Simulation s = test::arrival_stamped_camera();
-  SessionCalibrationOptions options = session_options(s);
+  CheckedCalibrationOptions options = session_options(s);
   int asked = 0;
   options.is_cancelled = [&asked] { return ++asked > 0; };
-  const SessionCalibration cancelled = calibrate_session(session_of(s, 1), options, nullptr);
+  const CheckedCalibration cancelled = calibrate_session(session_of(s, 1), options, nullptr);
   EXPECT_EQ(cancelled.result.status, CalibrationStatus::kCancelled);
   EXPECT_EQ(asked, 1);
   EXPECT_FALSE(cancelled.refusal.empty());

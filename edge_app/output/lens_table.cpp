@@ -1,4 +1,4 @@
-#include "edge_app/output/lens_rows.h"
+#include "edge_app/output/lens_table.h"
 
 #include <cstddef>
 
@@ -6,8 +6,8 @@
 
 namespace alidade {
 
-std::vector<LensRow> lens_rows(const PatternCalibration& calibration) {
-  std::vector<LensRow> rows;
+std::vector<LensTableRow> lens_table(const PatternCalibration& calibration) {
+  std::vector<LensTableRow> rows;
   for (int i = 0; i < kLensParameterCount; ++i) {
     const auto parameter = static_cast<LensParameter>(i);
     const bool is_delay = parameter == LensParameter::kLineDelay;

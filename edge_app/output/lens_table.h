@@ -8,13 +8,13 @@
 
 namespace alidade {
 
-struct LensRow {
+struct LensTableRow {
   const char* name;
   std::string value;  // line delay in us/row; others in their own unit
   std::string sigma;
   const char* unit;  // empty: dimensionless
 };
 
-[[nodiscard]] std::vector<LensRow> lens_rows(const PatternCalibration& calibration);
+[[nodiscard]] std::vector<LensTableRow> lens_table(const PatternCalibration& calibration);
 
 }  // namespace alidade

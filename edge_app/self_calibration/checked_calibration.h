@@ -29,7 +29,7 @@ struct CalibrationChecks {
   double worst_telemetry_ratio = 4;  // residuals over the stated noise
 };
 
-struct SessionCalibrationOptions {
+struct CheckedCalibrationOptions {
   int width = 0;                  // px
   int height = 0;                 // px
   CalibrationOptions adjustment;  // priors of a calibration without a known one
@@ -49,7 +49,7 @@ struct KnownCalibration {
   bool has_clock_offset = true;  // false: found with another connection
 };
 
-struct SessionCalibration {
+struct CheckedCalibration {
   CalibrationResult result;  // without the zoom
   std::string refusal;       // empty: it may be published
   double hold_out = 0;       // root mean square of the normalised residuals in held-out frames
@@ -59,8 +59,8 @@ struct SessionCalibration {
 };
 
 // known: null: from the data, and from what is known of the camera beforehand.
-[[nodiscard]] SessionCalibration calibrate_session(const CalibrationSession& session,
-                                                   const SessionCalibrationOptions& options,
+[[nodiscard]] CheckedCalibration calibrate_session(const CalibrationSession& session,
+                                                   const CheckedCalibrationOptions& options,
                                                    const KnownCalibration* known);
 
 }  // namespace alidade
