@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "edge_app/step/zoom_lookup.h"
+#include "core/realtime/lens/zoom_lookup.h"
 
 namespace alidade {
 namespace {

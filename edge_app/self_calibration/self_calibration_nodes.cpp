@@ -7,9 +7,9 @@
 #include <utility>
 
 #include "core/calibration/calibration_difference.h"
+#include "core/realtime/lens/zoom_lookup.h"
 #include "edge_app/self_calibration/keyframe_map.h"
 #include "edge_app/self_calibration/self_calibration.h"
-#include "edge_app/step/zoom_lookup.h"
 
 namespace alidade {
 namespace {

@@ -32,7 +32,8 @@ OrientationStep::OrientationStep(const OrientationStepOptions& options)
       video_clock_(options.video_clock, options.video_stamp_sigma_s, options.wait_for_pace),
       telemetry_clock_(options.telemetry_clock),
       telemetry_(empty_telemetry(false)),
-      steady_zoom_(options.zoom_tolerance),
+      zoom_(options.zoom_tolerance),
+      lens_(options.oe ? options.oe->lens.belief : ReadingBeliefOptions()),
       // A stored calibration was made over another connection.
       minimum_delay_sigma_s_(
           options.other_connection && options.calibrated ? options.minimum_delay_sigma_s : 0),
@@ -113,7 +114,7 @@ void OrientationStep::add_telemetry(const PanTiltSample& sample) {
   }
   telemetry_lost_ = false;
   const bool has_zoom = sample.zoom && std::isfinite(*sample.zoom);
-  if (has_zoom) take_zoom(sample.latest_time_s, *sample.zoom);
+  if (has_zoom && zoom_.take(sample.latest_time_s, *sample.zoom)) note_curve_here();
 
   TelemetrySample timed;
   timed.pan = sample.pan_rad;
@@ -128,7 +129,7 @@ void OrientationStep::add_telemetry(const PanTiltSample& sample) {
     timed.time_s = sample.latest_time_s - width_s / 2;
     timed.time_sigma_s = width_s > 0 ? width_s / std::sqrt(12.0) : options_.telemetry_stamp_sigma_s;
   }
-  if (has_zoom) zoom_lookup_.add(timed.time_s, *zoom_);
+  if (has_zoom) zoom_.place(timed.time_s);
   // The buffer counts what it refuses (a duplicate, a value that is not finite), and the records'
   // sigma shows the effect.
   static_cast<void>(telemetry_.push(timed));
@@ -172,7 +173,7 @@ void OrientationStep::adopt(const PublishedCalibration& published) {
   const bool keep = keeps_map(published);
   options_.calibration = published.calibration;
   options_.calibrated = published.calibrated;
-  zoom_at_adoption_ = zoom_;
+  zoom_.note_adoption();
   minimum_delay_sigma_s_ = 0;
   options_.zoom_curve = published.zoom_curve;
   note_curve_here();
@@ -183,7 +184,7 @@ OrientationRecord OrientationStep::empty_record() const {
   OrientationRecord record;
   record.calibrated = options_.calibrated && zoom_fits();
   record.camera = pack(options_.calibration);
-  record.zoom = told_zoom_;
+  record.zoom = zoom_.told();
   return record;
 }
 
@@ -232,7 +233,7 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
   const double to_middle_row_s = calibration.line_delay * (0.5 * calibration.camera.height);
   InterpolatedPanTilt measured;
   const double telemetry_time_s = clock.time_s + calibration.clock_offset + to_middle_row_s;
-  lens_time_s_ = telemetry_time_s;
+  lens_.begin_frame(telemetry_time_s);
   lasting_sigma_s_ = std::hypot(minimum_delay_sigma_s_, frame_time.off_line_s);
   double time_sigma_s = std::hypot(clock.sigma_s, minimum_delay_sigma_s_);
   QueryStatus query = telemetry_.query(telemetry_time_s, time_sigma_s, &measured);
@@ -267,12 +268,12 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
     oe_->reset(options_.calibration, focal_length());
   if (elsewhere || (oe_ && oe_->lens_has_moved())) {
     FrameLens lens;
-    if (follows_lens() && look_up_lens(telemetry_time_s, &lens)) {
+    if (follows_lens() && lens_.look_up(options_.zoom_curve, zoom_, readout_s(), &lens)) {
       record.calibrated = true;
       record.camera = pack(lens.calibration);
-      const bool excluded = reading_excluded_;
+      const bool excluded = lens_.belief() == ReadingBelief::kExcluded;
       orient(has_result(query) ? &measured : nullptr, image, &lens, &record);
-      events->zoom_contradicted = !excluded && reading_excluded_;
+      events->zoom_contradicted = !excluded && lens_.belief() == ReadingBelief::kExcluded;
       return record;
     }
   }
@@ -288,11 +289,9 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
 
 void OrientationStep::orient_between(const InterpolatedPanTilt* measured, double telemetry_time_s,
                                      OrientationRecord* record) {
-  const double readout_s =
-      std::abs(options_.calibration.line_delay) * options_.calibration.camera.height;
   Calibration between;
   // Lens and axes of another zoom cannot be used here.
-  if (!zoom_lookup_.calibration(options_.zoom_curve, telemetry_time_s, readout_s, &between)) {
+  if (!zoom_.calibration(options_.zoom_curve, telemetry_time_s, readout_s(), &between)) {
     record->status = RecordStatus::kOtherZoom;
     return;
   }
@@ -339,8 +338,8 @@ void OrientationStep::orient(const InterpolatedPanTilt* measured, const ImageVie
   if (focal_length() == FocalLength::kLearnt) record->camera = pack(frame.calibration);
   if (record->mode == RecordMode::kOe) {
     record->residual_px = residual_rms(*oe_);
-    note_found_lens(frame);
-    if (lens != nullptr) judge_reading(frame);
+    lens_.note_found(frame.calibration, frame.zoom_rate);
+    if (lens != nullptr) lens_.judge(frame.calibration);
   }
   record->orientation = orientation_of(frame);
   note_tie(record);

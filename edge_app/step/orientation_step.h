@@ -16,8 +16,9 @@
 
 #include "core/model/calibration.h"
 #include "core/model/clock_filter.h"
-#include "core/model/steady_zoom.h"
 #include "core/realtime/image/image_view.h"
+#include "core/realtime/lens/read_lens.h"
+#include "core/realtime/lens/zoom_readings.h"
 #include "core/realtime/oe_mode/oe_mode.h"
 #include "core/realtime/pt_mode.h"
 #include "core/realtime/start_up/start_up_tracker.h"
@@ -31,7 +32,6 @@
 #include "edge_app/step/repeated_images.h"
 #include "edge_app/step/scene_start.h"
 #include "edge_app/step/told_base.h"
-#include "edge_app/step/zoom_lookup.h"
 #include "platform/pan_tilt/pan_tilt_source.h"
 #include "platform/video/frame_source.h"
 
@@ -182,38 +182,16 @@ class OrientationStep {
   void orient_between(const InterpolatedPanTilt* measured, double telemetry_time_s,
                       OrientationRecord* record);
 
-  // A frame's lens by the zoom readings. If OE mode excluded the reading in the frame before, or
-  // the reading moves faster than any lens, it is the curve's lens at the focal length that OE mode
-  // found. False: the curve has no lens.
-  [[nodiscard]] bool look_up_lens(double telemetry_time_s, FrameLens* lens);
-  // The curve's lens at the focal length that OE mode found age_s ago. False: it found none lately.
-  [[nodiscard]] bool lens_as_found(double age_s, FrameLens* lens) const;
-  // The reading is farther from what OE mode found age_s ago than any lens moves in that time.
-  [[nodiscard]] bool reading_jumps(double age_s) const;
+  // s, from a frame's first row to its last.
+  [[nodiscard]] double readout_s() const;
   // For a lens taken to stand still: adds to its focal length's variance what a beginning movement
   // may have changed.
   void allow_for_begun_movement(Calibration* calibration) const;
-  // Remembers the focal length of OE mode's answer.
-  void note_found_lens(const FrameOrientation& found);
-  // Sets reading_excluded_ if that answer excludes the focal length of the reading.
-  void judge_reading(const FrameOrientation& found);
 
-  void take_zoom(double time_s, double reading);
-
-  std::optional<double> told_zoom_;  // device units, as last reported
-  SteadyZoom steady_zoom_;
-  std::optional<double> zoom_;  // the same without jitter
-  Calibration read_lens_;       // by the readings, of the frame added last
-  // OE mode's latest answer, at that frame's time. Focal length 0: there is none, or it is too old.
-  bool reading_excluded_ = false;  // by that answer
-  double found_focal_length_ = 0;  // px
-  double found_rate_ = 0;          // 1/s
-  double found_time_s_ = 0;        // s, telemetry time
-  double lens_time_s_ = 0;         // s, telemetry time, of the frame added last
-  bool zoom_on_curve_ = false;     // zoom_ lies on the zoom curve
-  bool begins_here_ = false;       // and the curve is sharp enough there for a map to begin
-  ZoomLookup zoom_lookup_;
-  std::optional<double> zoom_at_adoption_;  // the zoom of a calibration that has none
+  ZoomReadings zoom_;
+  ReadLens lens_;
+  bool zoom_on_curve_ = false;  // the present zoom lies on the zoom curve
+  bool begins_here_ = false;    // and the curve is sharp enough there for a map to begin
   double minimum_delay_sigma_s_ = 0;
   // s: the part of a frame's time error that neighbouring frames share.
   double lasting_sigma_s_ = 0;

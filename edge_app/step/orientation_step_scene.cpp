@@ -7,7 +7,6 @@
 #include "edge_app/record/record_status.h"
 #include "edge_app/step/frame_observations.h"
 #include "edge_app/step/orientation_step.h"
-#include "edge_app/step/zoom_lookup.h"
 
 namespace alidade {
 
@@ -47,11 +46,11 @@ bool OrientationStep::take_scene_lens(const ToldBase& told) {
   scene_lens_.covariance.row(f).setZero();
   scene_lens_.covariance.col(f).setZero();
   scene_lens_.covariance(f, f) = camera.focal_length * camera.focal_length * told.log_f_variance;
-  constexpr double kExcluded = 4;  // standard deviations
+  constexpr double kAlike = 4;  // standard deviations
   // Of log f: with less, turns are followed well enough; with more, not at all.
   constexpr double kLeast = 2e-3;
   constexpr double kMost = 1e-2;
-  return std::abs(change) < std::clamp(kExcluded * sigma, kLeast, kMost);
+  return std::abs(change) < std::clamp(kAlike * sigma, kLeast, kMost);
 }
 
 void OrientationStep::note_tie(OrientationRecord* record) const {
@@ -70,13 +69,13 @@ void OrientationStep::orient_by_scene(const ImageView& image, OrientationRecord*
   FrameOrientation frame;
   FrameLens lens;
   constexpr double kStands = 0.02;  // 1/s, of log f: less is its noise
-  const bool has_lens = oe_->lens_has_moved() && lens_as_found(lens_time_s_ - found_time_s_, &lens);
-  if (has_lens) lens.moves = std::abs(found_rate_) > kStands;
+  const bool has_lens = oe_->lens_has_moved() && lens_.as_found(options_.zoom_curve, &lens);
+  if (has_lens) lens.moves = std::abs(lens_.found_rate()) > kStands;
   if (!is_beginning_ && oe_->process(image, *record->time_s, nullptr, has_lens ? &lens : nullptr,
                                      &frame) == OeStatus::kOk) {
     scene_start_.forget();
     answered_by_oe_ = true;
-    note_found_lens(frame);
+    lens_.note_found(frame.calibration, frame.zoom_rate);
     if (focal_length() == FocalLength::kLearnt) {
       record->camera = pack(frame.calibration);
       scene_lens_ = frame.calibration;
@@ -116,7 +115,7 @@ bool OrientationStep::begin_by_scene(const ImageView& image, double time_s) {
   if (!is_beginning_) {
     is_beginning_ = true;
     beginning_since_s_ = time_s;
-    found_focal_length_ = 0;
+    lens_.forget();
     oe_->reset(scene_lens_, focal_length());
   }
   FrameOrientation frame;

@@ -20,7 +20,7 @@
 #include "core/model/trigonometry.h"
 #include "core/realtime/frame_orientation.h"
 #include "core/realtime/image/image_view.h"
-#include "core/realtime/oe_mode/frame_lens.h"
+#include "core/realtime/lens/frame_lens.h"
 #include "core/realtime/telemetry/telemetry_interpolation.h"
 #include "test/simulator/renderer.h"
 

@@ -15,6 +15,10 @@ namespace alidade {
 // standard deviations). The solution and the filter of the map's offset use the same.
 inline constexpr double kMaxContradiction = 36;
 
+// s; correlation time of the common error of the landmarks in view. The filter of the map's offset
+// and the track of the lens use the same.
+inline constexpr double kSharedCorrelation_s = 10;
+
 using Vector6 = Matrix<double, 6, 1>;
 using Matrix6 = Matrix<double, 6, 6>;
 

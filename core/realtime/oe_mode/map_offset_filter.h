@@ -26,7 +26,7 @@ struct MapOffsetOptions {
   double drift = 1e-6;       // rad / sqrt(s), >= 0; of map against telemetry, by heat and gears
   double lens_drift = 1e-7;  // 1 / sqrt(s), >= 0; of log f at rest, by heat
   // s, >= 0; correlation time of the common error of the landmarks in view.
-  double shared_correlation_time_s = 10;
+  double shared_correlation_time_s = kSharedCorrelation_s;
   // Chi-square, 2 degrees of freedom, > 0; gate of an innovation.
   double max_contradiction = kMaxContradiction;
 

@@ -51,7 +51,7 @@ bool OeMode::take_lens(const FrameLens* reading) {
     }
     // It is unknown when the lens was last at the position of a handed-over map.
     const double since_s = prediction_.has_last() ? prediction_.since_last_s(frame_.time_s)
-                                                  : options_.lens.track.longest_s;
+                                                  : options_.lens.belief.longest_s;
     lens_.follow(frame_.time_s - since_s, calibration_.camera.focal_length);
   }
   const LensScale& scale = offset_.lens();

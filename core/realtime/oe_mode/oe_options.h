@@ -2,10 +2,10 @@
 // OeOptions: all options of OE mode. Each estimator's are in its own struct in its own header.
 
 #include "core/realtime/image/image_noise.h"
+#include "core/realtime/lens/lens_follower.h"
 #include "core/realtime/oe_mode/base_tie.h"
 #include "core/realtime/oe_mode/landmark_maker.h"
 #include "core/realtime/oe_mode/landmark_search.h"
-#include "core/realtime/oe_mode/lens_follower.h"
 #include "core/realtime/oe_mode/map_offset_filter.h"
 #include "core/realtime/oe_mode/map_shear.h"
 #include "core/realtime/oe_mode/map_upkeep.h"

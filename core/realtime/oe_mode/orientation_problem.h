@@ -1,6 +1,6 @@
 #pragma once
-// Sums for orientation_solve.cpp: landmarks and prior as a linear problem. Times are in units of
-// half the read-out. Internal.
+// Sums of a frame's solution: landmarks and prior as a linear problem. Times are in units of half
+// the read-out. Internal to orientation_solve.h's files.
 
 #include <Eigen/LU>
 #include <array>

@@ -13,6 +13,7 @@
 
 #include "core/model/angle.h"
 #include "core/model/calibration.h"
+#include "core/realtime/lens/own_lens.h"
 #include "core/realtime/oe_mode/covariance.h"
 #include "core/realtime/oe_mode/lens_scale.h"
 
@@ -34,21 +35,6 @@ struct FoundLandmark {
   double normalised_square =
       0;                // out: squared residual after the solution, divided by its covariance
   bool inlier = false;  // out
-};
-
-// Prior of the frame's own lens l = (log f, its rate in 1/s), at phi = 0, without its landmarks.
-// Used if the lens has moved since the map was made:
-//   found - predicted + s phi = J (...) + z (dl_0 + t dl_1) + noise,   z = d u / d log f
-// l is eliminated first. The offset has absorbed the calibration's errors at the map's zoom (a
-// centre error of c px as c / f); at another zoom they differ, so the test for a contradiction
-// allows for them.
-struct ZoomPrior {
-  Vector2<double> value = Vector2<double>::Zero();  // expected minus predicted
-  Matrix2<double> covariance = Matrix2<double>::Identity();
-  Sensitivity<2> sensitivity = Sensitivity<2>::Zero();
-  // Variances of the calibration's errors at this zoom that it does not share with the map's lens.
-  // In the map's columns.
-  ParameterDirection own_variances = ParameterDirection::Zero();
 };
 
 // Knowledge without landmarks, relative to the motion with which the residuals were predicted.
@@ -95,17 +81,6 @@ struct SolvedLens {
   double measured = 0;
   double information = 0;
   Sensitivity<1> measured_sensitivity = Sensitivity<1>::Zero();
-};
-
-// Solution of the frame's own lens.
-struct SolvedZoom {
-  Vector2<double> correction = Vector2<double>::Zero();  // of the prediction, at phi = 0
-  Matrix2<double> covariance = Matrix2<double>::Zero();
-  Sensitivity<2> sensitivity = Sensitivity<2>::Zero();
-  Vector2<double> by_lens = Vector2<double>::Zero();  // change of correction per unit of phi
-  // rad^2, of the innovation, from errors of the calibration at this zoom, which the offset has not
-  // learnt.
-  Matrix2<double> innovation_by_calibration = Matrix2<double>::Zero();
 };
 
 struct SolvedMotion {

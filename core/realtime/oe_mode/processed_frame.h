@@ -6,6 +6,7 @@
 #include "core/model/calibration.h"
 #include "core/model/rolling_shutter.h"
 #include "core/realtime/image/image_view.h"
+#include "core/realtime/lens/own_lens.h"
 #include "core/realtime/oe_mode/covariance.h"
 
 namespace alidade {
@@ -23,23 +24,6 @@ enum class MapUse {
   kLost,     // landmarks do not hold, though some should be in view
   kNewView,  // no landmarks in view: telemetry places new ones
   kHeld      // landmarks held
-};
-
-// The frame's lens if it is not the map's (lens_track.h): covariance of log f (1) and its rate
-// (1/s), without the map's scale.
-struct OwnLens {
-  bool used = false;
-  Matrix2<double> covariance = Matrix2<double>::Zero();
-  Sensitivity<2> sensitivity = Sensitivity<2>::Zero();
-  int zoom = 0;  // of the map's cells, see LandmarkMap
-
-  // Variance of log f t seconds after the middle row.
-  [[nodiscard]] double variance(double t) const {
-    return covariance(0, 0) + t * (2 * covariance(0, 1) + t * covariance(1, 1));
-  }
-  [[nodiscard]] Sensitivity<1> sensitivity_at(double t) const {
-    return sensitivity.row(0) + t * sensitivity.row(1);
-  }
 };
 
 struct ProcessedFrame {

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "core/calibration/zoom_fit.h"
+#include "core/realtime/lens/zoom_lookup.h"
 #include "edge_app/step/orientation_step.h"
-#include "edge_app/step/zoom_lookup.h"
 #include "test/support/allocation_guard.h"
 #include "test/support/zoom_by_formula.h"
 

@@ -16,20 +16,19 @@
 #include <optional>
 
 #include "core/model/calibration.h"
-#include "core/realtime/oe_mode/frame_lens.h"
+#include "core/realtime/lens/frame_lens.h"
+#include "core/realtime/lens/lens_track.h"
+#include "core/realtime/lens/own_lens.h"
+#include "core/realtime/lens/reading_belief.h"
 #include "core/realtime/oe_mode/lens_scale.h"
-#include "core/realtime/oe_mode/lens_track.h"
-#include "core/realtime/oe_mode/orientation_solve.h"
-#include "core/realtime/oe_mode/processed_frame.h"
 
 namespace alidade {
 
 struct LensFollowerOptions {
   LensTrackOptions track;
+  ReadingBeliefOptions belief;
   int frames_at_rest = 3;  // >= 1; frames in a row without a rate or a moving reading until at rest
   double resting_sigmas = 4;  // sigmas, > 0; a smaller rate counts as none
-  double excluded_sigmas =
-      5;  // sigmas, > 0, of reading and landmarks together; beyond it the reading is wrong
   int frames_lost_for_good =
       50;  // >= 1; frames lost at a resting reading until landmarks are another lens's
   // Uncertainty without a reading, one standard deviation per unit of log f from the latest
@@ -52,7 +51,7 @@ class LensFollower {
  public:
   // options: valid.
   explicit LensFollower(const LensFollowerOptions& options)
-      : options_(options), track_(options.track) {}
+      : options_(options), track_(options.track), judge_(options.belief) {}
 
   // The lens is the map's. focal_length: px.
   void begin(double focal_length);
@@ -136,7 +135,11 @@ class LensFollower {
  private:
   // True if landmarks showed the lens recently.
   [[nodiscard]] bool is_young(double time_s) const {
-    return track_.age_s(time_s) < options_.track.longest_s;
+    return judge_.remembers(track_.age_s(time_s));
+  }
+  // Of the reading, which must exist.
+  [[nodiscard]] ReadingBelief belief(double time_s) const {
+    return judge_.belief(track_.age_s(time_s));
   }
   [[nodiscard]] double reading_variance(const LensScale& scale) const;
   void note_unknown();
@@ -148,12 +151,12 @@ class LensFollower {
 
   LensFollowerOptions options_;
   LensTrack track_;
+  ReadingJudge judge_;
   std::optional<FrameLens> reading_;    // of the frame
   std::optional<LensColumns> columns_;  // for the camera of look_through()
   LensTrack::State expected_;
   int frames_at_rest_ = 0;                // in a row
   int frames_lost_ = 0;                   // in a row
-  bool reading_contradicted_ = false;     // by the last frame in which landmarks held
   double last_reading_focal_length_ = 1;  // px
   // Variances of distortion in the corner (1) and centre (px^2): the largest of the readings at
   // which landmarks held since begin().

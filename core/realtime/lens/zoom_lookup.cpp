@@ -1,10 +1,13 @@
-#include "edge_app/step/zoom_lookup.h"
+#include "core/realtime/lens/zoom_lookup.h"
 
 #include <algorithm>
 #include <cmath>
 
 namespace alidade {
 namespace {
+
+// 1/s, one standard deviation of log f's rate: the speed of motors, where nothing else tells it.
+constexpr double kAnyRate = 1;
 
 // From a step along the curve, to whichever side the curve continues.
 void set_slopes(const ZoomCurve& curve, FrameLens* lens) {
@@ -116,8 +119,6 @@ bool ZoomLookup::lens(const ZoomCurve& curve, double time_s, double readout_s, d
   lens->rate = 0;
   lens->rate_sigma = 0;
   if (!lens->moves) return true;
-  // The speed of motors, for use where the curve does not reach.
-  constexpr double kAnyRate = 1;  // 1/s
   lens->rate_sigma = kAnyRate;
   Calibration from;
   Calibration to;
@@ -157,12 +158,12 @@ bool lens_of_focal_length(const ZoomCurve& curve, double focal_length, FrameLens
     set_slopes(curve, lens);
     lens->moves = true;
     lens->rate = 0;
-    lens->rate_sigma = 1;
+    lens->rate_sigma = kAnyRate;
     return true;
   }
   lens->moves = true;
   lens->rate = 0;
-  lens->rate_sigma = 1;
+  lens->rate_sigma = kAnyRate;
   for (int step = 0; step < kMaxSteps; ++step) {
     const double middle = at_a == at_b ? a : (a * at_b - b * at_a) / (at_b - at_a);
     double at_middle = 0;

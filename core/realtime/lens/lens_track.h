@@ -9,16 +9,20 @@
 // frame. At rest l is learnt once, as landmarks of neighbouring frames have the same error
 // (variance_inflation(), covariance.h). Fixed memory; no allocation. One thread.
 
+#include <cmath>
+
 #include "core/model/calibration.h"
 #include "core/realtime/oe_mode/covariance.h"
-#include "core/realtime/oe_mode/orientation_solve.h"
 
 namespace alidade {
 
+// 1/s^2; sigma of the acceleration of log f while a motor moves the lens.
+inline constexpr double kZoomAcceleration = 2;
+
 struct LensTrackOptions {
-  double acceleration = 2;  // 1/s^2, > 0; sigma of log f's acceleration while the lens moves
-  double drift = 1e-7;      // 1 / sqrt(s), >= 0; of log f at rest
-  double longest_s = 0.5;   // s, > 0; longest extrapolation without landmarks
+  double acceleration =
+      kZoomAcceleration;  // 1/s^2, > 0; sigma of log f's acceleration while the lens moves
+  double drift = 1e-7;    // 1 / sqrt(s), >= 0; of log f at rest
   // 1, > 0; smallest sigma of log f at rest, as landmarks have a common error for long.
   double least_sigma = 3e-6;
 

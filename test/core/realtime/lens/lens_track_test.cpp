@@ -1,6 +1,6 @@
 // The lens from frame to frame, against draws of how it moves.
 
-#include "core/realtime/oe_mode/lens_track.h"
+#include "core/realtime/lens/lens_track.h"
 
 #include <gtest/gtest.h>
 

@@ -1,12 +1,10 @@
-#include "core/realtime/oe_mode/lens_track.h"
+#include "core/realtime/lens/lens_track.h"
 
 #include <cmath>
 
 namespace alidade {
 namespace {
 
-// Of the landmarks' common error: as MapOffsetOptions::shared_correlation_time_s.
-constexpr double kCorrelation_s = 10;
 // Sigma of the rate at rest: smaller rates do not show.
 constexpr double kRestingRate = 1e-6;  // 1/s
 
@@ -15,7 +13,6 @@ constexpr double kRestingRate = 1e-6;  // 1/s
 bool LensTrackOptions::validate(const char** error) const {
   const char* problem = nullptr;
   if (!(least_sigma > 0)) problem = "least_sigma must be positive";
-  if (!(longest_s > 0)) problem = "longest_s must be positive";
   if (!(drift >= 0)) problem = "drift must not be negative";
   if (!(acceleration > 0)) problem = "acceleration must be positive";
   if (error != nullptr && problem != nullptr) *error = problem;
@@ -72,7 +69,7 @@ void LensTrack::learn(double time_s, bool moves, const State& predicted, const S
   state_ = predicted;
   state_.covariance(0, 0) = prior;
   if (!(information > 0)) return;
-  const double inflation = variance_inflation(kCorrelation_s, dt);
+  const double inflation = variance_inflation(kSharedCorrelation_s, dt);
   // Take this share of the solution's step.
   const double gain = prior * information / (inflation + prior * information);
   const double full = prior * information / (1 + prior * information);

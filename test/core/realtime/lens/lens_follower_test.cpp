@@ -1,6 +1,6 @@
 // The lens that has left the map's, against draws of how it moves, of what its reading says and of what landmarks see.
 
-#include "core/realtime/oe_mode/lens_follower.h"
+#include "core/realtime/lens/lens_follower.h"
 
 #include <gtest/gtest.h>
 

@@ -8,7 +8,7 @@
 #include <cstddef>
 
 #include "core/model/lens/zoom_curve.h"
-#include "core/realtime/oe_mode/frame_lens.h"
+#include "core/realtime/lens/frame_lens.h"
 
 namespace alidade {
 

@@ -1,4 +1,4 @@
-#include "core/realtime/oe_mode/lens_follower.h"
+#include "core/realtime/lens/lens_follower.h"
 
 #include <algorithm>
 
@@ -15,11 +15,10 @@ bool LensFollowerOptions::validate(const char** error) const {
   if (!(centre_change_px >= 0)) problem = "centre_change_px must not be negative";
   if (!(distortion_change >= 0)) problem = "distortion_change must not be negative";
   if (frames_lost_for_good < 1) problem = "frames_lost_for_good must be at least 1";
-  if (!(excluded_sigmas > 0)) problem = "excluded_sigmas must be positive";
   if (!(resting_sigmas > 0)) problem = "resting_sigmas must be positive";
   if (frames_at_rest < 1) problem = "frames_at_rest must be at least 1";
   if (error != nullptr && problem != nullptr) *error = problem;
-  return problem == nullptr && track.validate(error);
+  return problem == nullptr && track.validate(error) && belief.validate(error);
 }
 
 void LensFollower::begin(double focal_length) {
@@ -27,7 +26,7 @@ void LensFollower::begin(double focal_length) {
   last_reading_focal_length_ = focal_length;
   track_.reset();
   columns_.reset();
-  reading_contradicted_ = false;
+  judge_.forget();
   frames_lost_ = 0;
 }
 
@@ -63,7 +62,7 @@ Camera<double> LensFollower::with_focal_length(double log_focal_length, const Le
   const double change = log_focal_length - std::log(told.camera.focal_length);
   Camera<double> out = zoomed(told.camera, change);
   // Follow the curve only as far as the reading is believed.
-  const double most = options_.excluded_sigmas * relative_focal_length_sigma(told);
+  const double most = judge_.reach(relative_focal_length_sigma(told));
   const double along = std::clamp(change + scale.value, -most, most);
   out.distortion.radial += along * reading_->corner_by_zoom * corner_unit(out)[0];
   out.set_centre_offset(out.centre_offset() + along * reading_->centre_by_zoom);
@@ -85,7 +84,7 @@ double LensFollower::reading_variance(const LensScale& scale) const {
 }
 
 bool LensFollower::reading_tells_more(double time_s) const {
-  if (!reading_ || (reading_contradicted_ && is_young(time_s))) return false;
+  if (!reading_ || belief(time_s) != ReadingBelief::kBelieved) return false;
   // An extrapolated movement may end unnoticed.
   const double variance = std::pow(relative_focal_length_sigma(reading_->calibration), 2);
   return !(expected_.covariance(0, 0) < variance);
@@ -94,7 +93,7 @@ bool LensFollower::reading_tells_more(double time_s) const {
 void LensFollower::answer_unseen(double time_s, const LensScale& scale,
                                  const Camera<double>& camera, Calibration* answer) const {
   if (reading_) *answer = reading_->calibration;
-  if (!is_young(time_s) || (reading_ && !reading_contradicted_)) return;
+  if (!is_young(time_s) || (reading_ && belief(time_s) == ReadingBelief::kBelieved)) return;
   // What images showed recently is more accurate.
   answer->camera = zoomed(camera, scale.value);
   const double f = answer->camera.focal_length;
@@ -138,7 +137,7 @@ LearntLens LensFollower::learn(double time_s, const SolvedZoom& zoom, double foc
   const double told = std::log(reading_->calibration.camera.focal_length);
   out.reading_sigmas =
       std::abs(state.value[0] + scale.value - told) / std::sqrt(reading_variance(scale));
-  reading_contradicted_ = out.reading_sigmas > options_.excluded_sigmas;
+  judge_.judge(out.reading_sigmas, 1);
   return out;
 }
 

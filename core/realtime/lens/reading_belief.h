@@ -1,0 +1,70 @@
+#pragma once
+// ReadingJudge: whether a zoom reading is believed. Decided here only, from the lens that landmarks
+// showed; all others ask. Each judge has one source: LensFollower's is the lens that OE mode is
+// told, ReadLens's the reading itself.
+// Fixed memory; no allocation. One thread.
+
+#include <algorithm>
+#include <cmath>
+
+namespace alidade {
+
+enum class ReadingBelief {
+  kBelieved,  // no landmarks lately, or none that speak against it
+  kExcluded,  // the latest landmarks that held show another focal length
+  kJumped     // farther from the lens that they showed than a lens moves in the time since
+};
+
+struct ReadingBeliefOptions {
+  // Standard deviations of reading and landmarks together, > 0; beyond it the reading is wrong.
+  double excluded_sigmas = 5;
+  double longest_s = 0.5;      // s, > 0; for so long the lens that landmarks showed counts
+  double fastest = 3;          // 1/s, > 0, of log f: 20 times in a second; no lens is faster
+  double largest_sigma = 0.1;  // of log f, > 0; between two readings far apart it may be anything
+
+  // False if a value is invalid. *error, if not null, then says which in one line.
+  [[nodiscard]] bool validate(const char** error = nullptr) const {
+    const char* problem = nullptr;
+    if (!(largest_sigma > 0)) problem = "largest_sigma must be positive";
+    if (!(fastest > 0)) problem = "fastest must be positive";
+    if (!(longest_s > 0)) problem = "longest_s must be positive";
+    if (!(excluded_sigmas > 0)) problem = "excluded_sigmas must be positive";
+    if (error != nullptr && problem != nullptr) *error = problem;
+    return problem == nullptr;
+  }
+};
+
+class ReadingJudge {
+ public:
+  // options: valid.
+  explicit ReadingJudge(const ReadingBeliefOptions& options) : options_(options) {}
+
+  // No landmarks have been compared with a reading.
+  void forget() { excluded_ = false; }
+  // Landmarks held. difference: of log f, theirs minus the reading's; sigma: of both; or both in
+  // any other unit.
+  void judge(double difference, double sigma) { excluded_ = std::abs(difference) > reach(sigma); }
+
+  // age_s: since landmarks last showed the lens. True if that lens still counts.
+  [[nodiscard]] bool remembers(double age_s) const { return age_s < options_.longest_s; }
+  // Of the reading of a frame that is age_s later than that.
+  [[nodiscard]] ReadingBelief belief(double age_s) const {
+    return excluded_ && remembers(age_s) ? ReadingBelief::kExcluded : ReadingBelief::kBelieved;
+  }
+  // The same where also the reading's change of log f since then is known, with its sigma.
+  [[nodiscard]] ReadingBelief belief(double age_s, double change, double sigma) const {
+    if (!remembers(age_s)) return ReadingBelief::kBelieved;
+    if (excluded_) return ReadingBelief::kExcluded;
+    const double most =
+        options_.fastest * std::abs(age_s) + reach(std::min(sigma, options_.largest_sigma));
+    return std::abs(change) > most ? ReadingBelief::kJumped : ReadingBelief::kBelieved;
+  }
+  // Largest difference from a reading of this sigma at which it is believed.
+  [[nodiscard]] double reach(double sigma) const { return options_.excluded_sigmas * sigma; }
+
+ private:
+  ReadingBeliefOptions options_;
+  bool excluded_ = false;
+};
+
+}  // namespace alidade
