@@ -91,7 +91,7 @@ std::string format_calibration(const Calibration& calibration, const Calibration
       << YAML::Value << std::to_string(calibration.camera.height) << YAML::EndMap;
   write_scalar(Parameter::kFocalLength, calibration.camera.focal_length, "px");
   write_scalar(Parameter::kAspect, calibration.camera.aspect, "f_v / f_u");
-  write_scalar(Parameter::kRadialDistortion, calibration.camera.distortion.radial,
+  write_scalar(Parameter::kRadialDistortion, calibration.camera.distortion.only_term(),
                "u = f x (1 + k |x|^2) + centre");
   const std::vector<Parameter> parameters = parameters_of(calibration);
   if (calibration.has_centre()) {

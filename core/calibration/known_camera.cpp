@@ -123,7 +123,7 @@ class KnownCameraTrial {
     if (known_.focal_length.wanted) options.focal_length = known_.focal_length.prior;
     if (!known_.radial_distortion.wanted) return;
     const Difference k =
-        difference_of(known_.radial_distortion.prior, alone.camera.distortion.radial,
+        difference_of(known_.radial_distortion.prior, alone.camera.distortion.only_term(),
                       parameter_sigma(alone, Parameter::kRadialDistortion), 1, "");
     if (k.sigmas <= kMostSigmas) {
       options.radial_distortion = known_.radial_distortion.prior;

@@ -81,7 +81,7 @@ class CalibrationReader {
                      " sees more than 157 degrees across the image; give pixels, not millimetres");
     }
     if (root["aspect"]) calibration_.camera.aspect = scalar(Parameter::kAspect);
-    calibration_.camera.distortion.radial = scalar(Parameter::kRadialDistortion);
+    calibration_.camera.distortion.only_term() = scalar(Parameter::kRadialDistortion);
     if (root["centre_offset"]) calibration_.camera.set_centre_offset(centre_offset());
     calibration_.line_delay = scalar(Parameter::kLineDelay);
     calibration_.mechanics.pan_axis =

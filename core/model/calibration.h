@@ -121,7 +121,7 @@ struct Calibration {
     case Parameter::kAspect:
       return calibration.camera.aspect;
     case Parameter::kRadialDistortion:
-      return calibration.camera.distortion.radial;
+      return calibration.camera.distortion.only_term();
     case Parameter::kCentreU:
       return calibration.camera.centre_u;
     case Parameter::kCentreV:

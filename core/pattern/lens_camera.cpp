@@ -89,7 +89,7 @@ std::optional<Fit> fit(const std::vector<GridPoint>& part, const Camera<double>&
     if (!change.allFinite()) return std::nullopt;
     camera.focal_length *= std::exp(change[0]);
     camera.aspect *= std::exp(change[1]);
-    camera.distortion.radial += k_unit * change[2];
+    camera.distortion.only_term() += k_unit * change[2];
     R = exp_so3(Vector3<double>(change.tail<3>())) * R;
     if (change.norm() > 1e-10) continue;
     result.rms_px = std::sqrt(error.squaredNorm() / static_cast<double>(rows));
@@ -112,7 +112,7 @@ std::array<Part, 6> parts() {
 }
 
 Vector3<double> parameters_of(const Camera<double>& camera) {
-  return {camera.focal_length, camera.aspect, camera.distortion.radial};
+  return {camera.focal_length, camera.aspect, camera.distortion.only_term()};
 }
 
 // The fit over the whole image, and its grid.

@@ -74,7 +74,7 @@ std::string zooms_text(const ZoomFit& fit, const std::vector<Calibration>& nodes
     const double v = parameter_sigma(c, Parameter::kCentreV);
     text += fmt::format("{:>10g}  {:>12}  {:>9}  {:>12}  {:>9}  {:>16}  {:>13}\n", *c.zoom,
                         value_text(c.camera.focal_length, f), sigma_text(f),
-                        value_text(c.camera.distortion.radial, k), sigma_text(k),
+                        value_text(c.camera.distortion.only_term(), k), sigma_text(k),
                         value_text(c.camera.centre_u, u) + ", " + value_text(c.camera.centre_v, v),
                         sigma_text(u) + ", " + sigma_text(v));
   }

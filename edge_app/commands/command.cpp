@@ -109,7 +109,7 @@ Calibration data_sheet_calibration(const CameraConfig& camera) {
         sigma * sigma;
   }
   calibration.camera.aspect = camera.aspect;
-  calibration.camera.distortion.radial = camera.radial_distortion;
+  calibration.camera.distortion.only_term() = camera.radial_distortion;
   calibration.line_delay = camera.upside_down ? -camera.line_delay_s : camera.line_delay_s;
   // What is not measured is nominal. These sigmas allow for axes mounted as well as PTCEE assumes,
   // and for the difference in delay between two network links.

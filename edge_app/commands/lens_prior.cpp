@@ -77,7 +77,7 @@ KnownCamera load_lens_prior(const std::string& path, int width, int height,
   camera.name = path;
   camera.focal_length = known(nearest->camera.focal_length, 0);
   camera.aspect = known(nearest->camera.aspect, 1);
-  camera.radial_distortion = known(nearest->camera.distortion.radial, 2);
+  camera.radial_distortion = known(nearest->camera.distortion.only_term(), 2);
   camera.line_delay = known(nearest->line_delay, 3);
   return camera;
 }

@@ -32,7 +32,7 @@ void add_localization(const Localization& found, const Mechanics<double>& mechan
   (*json)["focal_length_px"] = pose.camera.focal_length;
   (*json)["focal_length_sigma_px"] = pose.camera.focal_length * std::sqrt(pose.covariance(3, 3));
   (*json)["aspect"] = pose.camera.aspect;
-  (*json)["radial_distortion"] = pose.camera.distortion.radial;
+  (*json)["radial_distortion"] = pose.camera.distortion.only_term();
 }
 
 }  // namespace alidade

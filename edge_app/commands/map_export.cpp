@@ -52,7 +52,7 @@ std::string keyframes_csv(const SceneMap& map) {
     const Eigen::Quaterniond& q = k.R_base_from_camera;
     for (const double x : {q.x(), q.y(), q.z(), q.w(), camera.focal_length,
                            camera.focal_length * std::sqrt(k.covariance(3, 3)),
-                           camera.distortion.radial, centre.x(), centre.y()}) {
+                           camera.distortion.only_term(), centre.x(), centre.y()}) {
       cells.push_back(exact_text(x));
     }
     cells.push_back(std::to_string(landmarks[i]));

@@ -57,7 +57,7 @@ void write_side_files(const Config& config, const std::string& directory) {
     const Camera<double>& camera = data_sheet_calibration(config.camera).camera;
     std::ofstream(fs::path(directory) / "guess.yaml")
         << fmt::format("focal_length: {{value: {}}}\nradial_distortion: {{value: {}}}\n",
-                       camera.focal_length, camera.distortion.radial);
+                       camera.focal_length, camera.distortion.only_term());
   }
 }
 

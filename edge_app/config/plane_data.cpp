@@ -253,7 +253,7 @@ class PlaneDataReader {
     out.camera.focal_length = required(record, "focal_length_px", {1, 1e7, "px"}, needed);
     out.focal_length_sigma_px = required(record, "focal_length_sigma_px", {0, 1e7, "px"}, needed);
     out.camera.aspect = required(record, "aspect", {0.1, 10, "1"}, needed);
-    out.camera.distortion.radial =
+    out.camera.distortion.only_term() =
         required(record, "radial_distortion", {-1e12, 1e12, "1"}, needed);
     const std::vector<double> centre =
         required_list(record, "centre_offset_px", 2, {-1e5, 1e5, "px"}, needed);

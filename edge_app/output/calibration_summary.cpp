@@ -63,7 +63,7 @@ std::vector<SummaryRow> summary_rows(const CalibrationResult& result,
   std::vector<SummaryRow> rows = {
       scalar_row(c, Parameter::kFocalLength, c.camera.focal_length, 1, "px", options.focal_length),
       scalar_row(c, Parameter::kAspect, c.camera.aspect, 1, "1", options.aspect),
-      scalar_row(c, Parameter::kRadialDistortion, c.camera.distortion.radial, 1, "1",
+      scalar_row(c, Parameter::kRadialDistortion, c.camera.distortion.only_term(), 1, "1",
                  options.radial_distortion),
       scalar_row(c, Parameter::kLineDelay, c.line_delay, 1e-6, "us/row", options.line_delay),
       axis_row(c, "pan_axis", m.pan_axis, Parameter::kPanAxis0, options.axis_sigma_rad),

@@ -24,7 +24,7 @@ PlainCalibration pack(const Calibration& calibration) {
   PlainCalibration out;
   out.focal_length = calibration.camera.focal_length;
   out.aspect = calibration.camera.aspect;
-  out.radial_distortion = calibration.camera.distortion.radial;
+  out.radial_distortion = calibration.camera.distortion.only_term();
   out.centre_u = calibration.camera.centre_u;
   out.centre_v = calibration.camera.centre_v;
   out.width = calibration.camera.width;
@@ -59,7 +59,7 @@ Calibration unpack(const PlainCalibration& calibration) {
   Calibration out;
   out.camera.focal_length = calibration.focal_length;
   out.camera.aspect = calibration.aspect;
-  out.camera.distortion.radial = calibration.radial_distortion;
+  out.camera.distortion.only_term() = calibration.radial_distortion;
   out.camera.centre_u = calibration.centre_u;
   out.camera.centre_v = calibration.centre_v;
   out.camera.width = calibration.width;

@@ -27,7 +27,7 @@ void set_priors(const KnownCalibration& known, double inflation, double common_s
   };
   adjustment->focal_length = prior(calibration.camera.focal_length, Parameter::kFocalLength);
   adjustment->radial_distortion =
-      prior(calibration.camera.distortion.radial, Parameter::kRadialDistortion);
+      prior(calibration.camera.distortion.only_term(), Parameter::kRadialDistortion);
   adjustment->line_delay = prior(calibration.line_delay, Parameter::kLineDelay);
   if (known.has_clock_offset) {
     constexpr double kLeastOwn = 0.2;  // of the sigma

@@ -21,7 +21,7 @@ std::string describe(const Calibration& c) {
   };
   return fmt::format("focal length {}, radial distortion {}, line delay {}, clock offset {}",
                      estimate(c.camera.focal_length, Parameter::kFocalLength, 1, "px"),
-                     estimate(c.camera.distortion.radial, Parameter::kRadialDistortion, 1, ""),
+                     estimate(c.camera.distortion.only_term(), Parameter::kRadialDistortion, 1, ""),
                      estimate(c.line_delay, Parameter::kLineDelay, 1e-6, "us"),
                      estimate(c.clock_offset, Parameter::kClockOffset, 1e-3, "ms"));
 }

@@ -251,7 +251,7 @@ std::uint32_t calibration_check(const Calibration& c) {
   values.u32(static_cast<std::uint32_t>(c.camera.width));
   values.u32(static_cast<std::uint32_t>(c.camera.height));
   for (const double value :
-       {c.camera.focal_length, c.camera.aspect, c.camera.distortion.radial, c.line_delay,
+       {c.camera.focal_length, c.camera.aspect, c.camera.distortion.only_term(), c.line_delay,
         c.mechanics.pan_scale, c.mechanics.tilt_scale, c.clock_offset}) {
     values.f64(value);
   }

@@ -265,7 +265,7 @@ class ZoomingCamera {
     const Camera<double> from = curve_of(std::max(config_.zoom->reading.wide, z - kStep), 0).camera;
     const Camera<double> to = curve_of(std::min(config_.zoom->reading.tele, z + kStep), 0).camera;
     const double change = std::log(to.focal_length / from.focal_length);
-    lens->corner_by_zoom = (corner_distortion(to)[0] - corner_distortion(from)[0]) / change;
+    lens->corner_by_zoom = (corner_distortion(to) - corner_distortion(from)) / change;
     lens->centre_by_zoom = (to.centre_offset() - from.centre_offset()) / change;
   }
 

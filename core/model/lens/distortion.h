@@ -49,6 +49,16 @@ struct RadialDistortion {
 
   [[nodiscard]] S& operator[](int) { return radial; }
   [[nodiscard]] const S& operator[](int) const { return radial; }
+  // For code that names the term. With a second term it does not compile: each caller must then say
+  // what becomes of the other.
+  [[nodiscard]] S& only_term() {
+    static_assert(kCount == 1, "names one term of several");
+    return radial;
+  }
+  [[nodiscard]] const S& only_term() const {
+    static_assert(kCount == 1, "names one term of several");
+    return radial;
+  }
 
   template <class T>
   [[nodiscard]] RadialDistortion<T> cast() const {

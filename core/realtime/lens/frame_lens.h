@@ -3,6 +3,7 @@
 // (core/model/lens/zoom_curve.h). Plain values.
 
 #include "core/model/calibration.h"
+#include "core/model/lens/zoom_law.h"
 
 namespace alidade {
 
@@ -17,7 +18,7 @@ struct FrameLens {
   // Slopes along the curve: d distortion in the corner (1) and d optical centre (px) per unit of
   // log f. Both are taken at the focal length that the frame shows, which a coarse reading does not
   // have.
-  double corner_by_zoom = 0;
+  CornerDistortion<double> corner_by_zoom = CornerDistortion<double>::Zero();
   Vector2<double> centre_by_zoom = Vector2<double>::Zero();
 };
 

@@ -1,12 +1,29 @@
 #include "core/realtime/lens/lens_follower.h"
 
 #include <algorithm>
+#include <array>
 
 namespace alidade {
 namespace {
 
 constexpr int kOfFocalLength = index(Parameter::kFocalLength);
-constexpr int kOfDistortion = index(Parameter::kRadialDistortion);
+// The parameters that a frame's own lens has beside its focal length, and the unit of each: a term
+// of the distortion counts by its share in the corner.
+struct OwnParameter {
+  int index;
+  double unit;
+  int term;  // of the distortion; -1: none
+};
+std::array<OwnParameter, kDistortionCount + 2> own_parameters(const Camera<double>& camera) {
+  const CornerDistortion<double> unit = corner_unit(camera);
+  std::array<OwnParameter, kDistortionCount + 2> out{};
+  for (int i = 0; i < kDistortionCount; ++i) {
+    out[static_cast<std::size_t>(i)] = {camera_column::kDistortion + i, unit[i], i};
+  }
+  out[kDistortionCount] = {camera_column::kCentreU, 1, -1};
+  out[kDistortionCount + 1] = {camera_column::kCentreV, 1, -1};
+  return out;
+}
 
 }  // namespace
 
@@ -64,7 +81,10 @@ Camera<double> LensFollower::with_focal_length(double log_focal_length, const Le
   // Follow the curve only as far as the reading is believed.
   const double most = judge_.reach(relative_focal_length_sigma(told));
   const double along = std::clamp(change + scale.value, -most, most);
-  out.distortion.radial += along * reading_->corner_by_zoom * corner_unit(out)[0];
+  const CornerDistortion<double> unit = corner_unit(out);
+  for (int i = 0; i < kDistortionCount; ++i) {
+    out.distortion[i] += along * reading_->corner_by_zoom[i] * unit[i];
+  }
   out.set_centre_offset(out.centre_offset() + along * reading_->centre_by_zoom);
   return out;
 }
@@ -107,14 +127,14 @@ ZoomPrior LensFollower::prior(const Camera<double>& camera, double zoom_rate) co
   out.covariance = expected_.covariance;
   out.sensitivity = expected_.sensitivity;
   const double since = without_reading(camera);
-  const auto set = [&](Parameter p, double unknown) {
-    const double told = reading_ ? reading_->calibration.covariance(index(p), index(p)) : 0;
-    out.own_variances[index(p)] = told + unknown * unknown;
-  };
-  set(Parameter::kRadialDistortion, options_.distortion_change * since * corner_unit(camera)[0]);
-  set(Parameter::kCentreU, options_.centre_change_px * since);
-  set(Parameter::kCentreV, options_.centre_change_px * since);
-  out.own_variances[kOfDistortion] /= columns_->of_map[0] * columns_->of_map[0];
+  for (const OwnParameter& own : own_parameters(camera)) {
+    const bool is_term = own.term >= 0;
+    const double told = reading_ ? reading_->calibration.covariance(own.index, own.index) : 0;
+    const double unknown =
+        (is_term ? options_.distortion_change : options_.centre_change_px) * since * own.unit;
+    const double of_map = is_term ? columns_->of_map[own.term] : 1;
+    out.own_variances[own.index] = (told + unknown * unknown) / (of_map * of_map);
+  }
   return out;
 }
 
@@ -145,13 +165,10 @@ LearntLens LensFollower::learn(double time_s, const SolvedZoom& zoom, double foc
 void LensFollower::note_unknown() {
   if (!reading_) return;
   const Calibration& told = reading_->calibration;
-  const auto note = [&](Parameter p, double unit) {
-    const int i = index(p);
-    most_unknown_[i] = std::max(most_unknown_[i], told.covariance(i, i) / (unit * unit));
-  };
-  note(Parameter::kRadialDistortion, corner_unit(told.camera)[0]);
-  note(Parameter::kCentreU, 1);
-  note(Parameter::kCentreV, 1);
+  for (const OwnParameter& own : own_parameters(told.camera)) {
+    const int i = own.index;
+    most_unknown_[i] = std::max(most_unknown_[i], told.covariance(i, i) / (own.unit * own.unit));
+  }
 }
 
 ParameterDirection LensFollower::unshared(const LensScale& scale) const {
@@ -160,14 +177,12 @@ ParameterDirection LensFollower::unshared(const LensScale& scale) const {
   const Calibration& told = reading_->calibration;
   ParameterCovariance<double> in_frame = scale.others;
   columns_->to_frame(&in_frame);
-  const auto set = [&](Parameter p, double unit, double column) {
-    const int i = index(p);
-    const double most = std::max(told.covariance(i, i), unit * unit * most_unknown_[i]);
-    out[i] = std::max(0.0, most - in_frame(i, i)) / (column * column);
-  };
-  set(Parameter::kRadialDistortion, corner_unit(told.camera)[0], columns_->of_map[0]);
-  set(Parameter::kCentreU, 1, 1);
-  set(Parameter::kCentreV, 1, 1);
+  for (const OwnParameter& own : own_parameters(told.camera)) {
+    const int i = own.index;
+    const double of_map = own.term >= 0 ? columns_->of_map[own.term] : 1;
+    const double most = std::max(told.covariance(i, i), own.unit * own.unit * most_unknown_[i]);
+    out[i] = std::max(0.0, most - in_frame(i, i)) / (of_map * of_map);
+  }
   return out;
 }
 
@@ -186,18 +201,21 @@ Calibration LensFollower::answer(const Calibration& calibration, const OwnLens& 
   const ParameterDirection own_errors = unshared(scale);
   // From landmarks with such errors, and from this frame's: its distortion error alone can look
   // like that change of log f.
-  const double by_own_errors =
-      (of_it * own_errors.asDiagonal() * of_it.transpose()).value() +
-      own_errors[kOfDistortion] *
-          std::pow(columns_->of_map[0] / corner_unit(calibration.camera)[0], 2);
+  double by_own_errors = (of_it * own_errors.asDiagonal() * of_it.transpose()).value();
+  const CornerDistortion<double> unit = corner_unit(calibration.camera);
+  for (int i = 0; i < kDistortionCount; ++i) {
+    by_own_errors +=
+        own_errors[camera_column::kDistortion + i] * std::pow(columns_->of_map[i] / unit[i], 2);
+  }
   Calibration out =
       scale.at(calibration, phi, variance + of_lens + unknown * unknown + by_own_errors,
                sensitivity + of_it);
   out.covariance.diagonal() += own_errors;
   columns_->to_frame(&out.covariance);
-  out.covariance(kOfDistortion, kOfDistortion) += std::pow(unknown * corner_unit(out.camera)[0], 2);
-  for (const Parameter p : {Parameter::kCentreU, Parameter::kCentreV}) {
-    out.covariance(index(p), index(p)) += std::pow(options_.centre_change_px * since, 2);
+  for (const OwnParameter& of_frame : own_parameters(out.camera)) {
+    const double change =
+        of_frame.term >= 0 ? unknown * of_frame.unit : options_.centre_change_px * since;
+    out.covariance(of_frame.index, of_frame.index) += change * change;
   }
   return out;
 }

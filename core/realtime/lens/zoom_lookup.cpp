@@ -14,7 +14,7 @@ void set_slopes(const ZoomCurve& curve, FrameLens* lens) {
   constexpr double kStep = 5e-3;  // of the range of readings
   const double step = kStep * (curve.last_reading() - curve.first_reading());
   const double reading = *lens->calibration.zoom;
-  lens->corner_by_zoom = 0;
+  lens->corner_by_zoom.setZero();
   lens->centre_by_zoom.setZero();
   Calibration beside;
   if (!curve.at(reading + step, &beside) && !curve.at(reading - step, &beside)) return;
@@ -24,7 +24,7 @@ void set_slopes(const ZoomCurve& curve, FrameLens* lens) {
   // Smaller: the lens does not zoom there, or turns over.
   constexpr double kLeast = 1e-6;
   if (!(std::abs(change) > kLeast)) return;
-  lens->corner_by_zoom = (corner_distortion(to)[0] - corner_distortion(from)[0]) / change;
+  lens->corner_by_zoom = (corner_distortion(to) - corner_distortion(from)) / change;
   lens->centre_by_zoom = (to.centre_offset() - from.centre_offset()) / change;
 }
 

@@ -173,7 +173,7 @@ TEST_F(FollowedLens, HasDistortionAndCentreOfTheFocalLengthThatIsSeen) {
   FrameLens reading = told(1.03 * kMapFocalLength, true);
   const Camera<double>& of_reading = reading.calibration.camera;
   reading.calibration.covariance(0, 0) = std::pow(kStep * of_reading.focal_length, 2);
-  reading.corner_by_zoom = 0.05;
+  reading.corner_by_zoom[0] = 0.05;
   reading.centre_by_zoom = {4, -2};
   scale_.value = 1e-3;
   follower_.begin_frame(&reading);

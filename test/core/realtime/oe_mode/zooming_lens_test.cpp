@@ -209,7 +209,7 @@ TEST_F(ZoomingLens, ErrsAsItSaysWhereTheCurveKnowsTheDistortionLess) {
       camera.distortion.radial += away * error * of_corner;
       const int of_k = index(Parameter::kRadialDistortion);
       lens.calibration.covariance(of_k, of_k) += std::pow(away * kUnknown * of_corner, 2);
-      lens.corner_by_zoom -= error / std::log(4.0);
+      lens.corner_by_zoom[0] -= error / std::log(4.0);
       return lens;
     };
     oe_->reset(lens_of(first).calibration, FocalLength::kLearnt);
