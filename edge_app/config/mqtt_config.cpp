@@ -19,7 +19,7 @@ void read_broker(YamlSection& section, MqttOptions* mqtt) {
     section.fail("url", "is not an address; expected for example mqtt://broker:1883");
   if (!url.path.empty() && url.path != "/")
     section.fail("url", "has a path, which a broker has none of; see mqtt.prefix for topics");
-  mqtt->tls = url.scheme == "mqtts";
+  mqtt->tls = is_by_tls(url.scheme);
   mqtt->host = url.host;
   // An IPv6 address stands in brackets.
   if (mqtt->host.size() > 2 && mqtt->host.front() == '[')

@@ -4,6 +4,7 @@
 
 #include "edge_app/config/link_keys.h"
 #include "platform/streams/picture_size.h"
+#include "platform/system/url.h"
 
 namespace alidade {
 namespace {
@@ -16,7 +17,7 @@ void read_rtsp(YamlSection& section, const std::string& config_path, VideoConfig
   video->url = required_url(section, "rtsp://camera/stream", {"rtsp://", "rtsps://"});
   read_login(section, &video->user, &video->password);
   video->rules = read_link_rules(section);
-  const bool by_tls = video->url.rfind("rtsps://", 0) == 0;
+  const bool by_tls = is_by_tls(video->url);
   if (section.choice("transport", {"tcp", "udp"}).value_or("tcp") == "udp") {
     if (by_tls)
       section.fail("transport", "udp does not go with rtsps://; leave it out, or set tcp");

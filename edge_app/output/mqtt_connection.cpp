@@ -10,6 +10,7 @@
 #include <array>
 #include <cerrno>
 #include <cstdint>
+#include <memory>
 #include <system_error>
 
 #include "platform/system/clock.h"
@@ -35,9 +36,26 @@ bool is_readable(const std::string& file) {
 
 }  // namespace
 
+// The library's object, and what it tells. Only calls of the connection lead to `owner`.
+struct MqttConnection::Client {
+  explicit Client(MqttConnection* of) : owner(of) {}
+  ~Client() {
+    if (handle != nullptr) mosquitto_destroy(handle);
+  }
+  Client(const Client&) = delete;
+  Client& operator=(const Client&) = delete;
+
+  MqttConnection* owner;
+  mosquitto* handle = nullptr;
+  std::string last_complaint;  // last error of the library
+  // Of the attempt to connect.
+  int code = MOSQ_ERR_SUCCESS;
+  int error_number = 0;
+};
+
 struct MqttConnection::Callbacks {
   static void connected(mosquitto* /*client*/, void* self, int answer) {
-    auto* connection = static_cast<MqttConnection*>(self);
+    MqttConnection* const connection = static_cast<Client*>(self)->owner;
     if (answer == 0) {
       connection->connected_ = true;
     } else {
@@ -45,33 +63,30 @@ struct MqttConnection::Callbacks {
     }
   }
   static void published(mosquitto* /*client*/, void* self, int id) {
-    static_cast<MqttConnection*>(self)->on_published_(id);
+    static_cast<Client*>(self)->owner->on_published_(id);
   }
   static void logged(mosquitto* /*client*/, void* self, int level, const char* text) {
-    if (level == MOSQ_LOG_ERR)
-      static_cast<MqttConnection*>(self)->last_complaint_ = shown(text, 160);
+    if (level == MOSQ_LOG_ERR) static_cast<Client*>(self)->last_complaint = shown(text, 160);
   }
 };
 
-MqttConnection::MqttConnection(const MqttOptions& options, const Message* will)
-    : options_(options) {
+MqttConnection::MqttConnection(const MqttOptions& options, const Message* will, Errand* errand)
+    : options_(options), errand_(*errand), client_(std::make_shared<Client>(this)) {
   if (library_is_ready())
-    client_ =
-        mosquitto_new(options.client_id.empty() ? nullptr : options.client_id.c_str(), true, this);
-  if (client_ == nullptr) return;
-  mosquitto_connect_callback_set(client_, &Callbacks::connected);
-  mosquitto_publish_callback_set(client_, &Callbacks::published);
-  mosquitto_log_callback_set(client_, &Callbacks::logged);
+    client_->handle = mosquitto_new(options.client_id.empty() ? nullptr : options.client_id.c_str(),
+                                    true, client_.get());
+  if (handle() == nullptr) return;
+  mosquitto_connect_callback_set(handle(), &Callbacks::connected);
+  mosquitto_publish_callback_set(handle(), &Callbacks::published);
+  mosquitto_log_callback_set(handle(), &Callbacks::logged);
   if (will == nullptr) return;
   const int set =
-      mosquitto_will_set(client_, will->topic.c_str(), static_cast<int>(will->payload.size()),
+      mosquitto_will_set(handle(), will->topic.c_str(), static_cast<int>(will->payload.size()),
                          will->payload.data(), options.qos, will->retain);
   if (set != MOSQ_ERR_SUCCESS) set_up_error_ = mosquitto_strerror(set);
 }
 
-MqttConnection::~MqttConnection() {
-  if (client_ != nullptr) mosquitto_destroy(client_);
-}
+mosquitto* MqttConnection::handle() const { return client_->handle; }
 
 bool MqttConnection::fail_with(const std::string& what) {
   connected_ = false;
@@ -81,10 +96,10 @@ bool MqttConnection::fail_with(const std::string& what) {
 
 // Sets login and TLS.
 bool MqttConnection::set_up() {
-  if (client_ == nullptr) return fail_with("there is no memory for a connection");
+  if (handle() == nullptr) return fail_with("there is no memory for a connection");
   if (!set_up_error_.empty()) return fail_with(set_up_error_);
   if (!options_.user.empty() &&
-      mosquitto_username_pw_set(client_, options_.user.c_str(),
+      mosquitto_username_pw_set(handle(), options_.user.c_str(),
                                 options_.password.empty() ? nullptr : options_.password.c_str()) !=
           MOSQ_ERR_SUCCESS)
     return fail_with("the user cannot be sent; use printable text for mqtt.user");
@@ -93,7 +108,7 @@ bool MqttConnection::set_up() {
     return text.empty() ? nullptr : text.c_str();
   };
   const int set = mosquitto_tls_set(
-      client_, or_null(options_.ca_file), options_.ca_file.empty() ? "/etc/ssl/certs" : nullptr,
+      handle(), or_null(options_.ca_file), options_.ca_file.empty() ? "/etc/ssl/certs" : nullptr,
       or_null(options_.certificate_file), or_null(options_.key_file), nullptr);
   if (set == MOSQ_ERR_SUCCESS) return true;
   return fail_with(fmt::format("TLS cannot be used: {}", mosquitto_strerror(set)));
@@ -114,10 +129,21 @@ std::string MqttConnection::files_error(const MqttOptions& options) {
 bool MqttConnection::begin() {
   if (!set_up()) return false;
   give_up_s_ = monotonic_now_s() + options_.timeout_s;
-  const int code =
-      mosquitto_connect_async(client_, options_.host.c_str(), options_.port, options_.keep_alive_s);
+  beginning_ = errand_.begin([client = client_, host = options_.host, port = options_.port,
+                              keep_alive_s = options_.keep_alive_s] {
+    client->code = mosquitto_connect_async(client->handle, host.c_str(), port, keep_alive_s);
+    client->error_number = errno;
+  });
+  return beginning_ || fail_with(kNameNotLookedUp);
+}
+
+// While the name is looked up. False: that failed.
+bool MqttConnection::go_on_beginning() {
+  if (!errand_.is_over()) return monotonic_now_s() < give_up_s_ || fail_with(kNameNotLookedUp);
+  beginning_ = false;
+  const int code = client_->code;
   if (code == MOSQ_ERR_SUCCESS || code == MOSQ_ERR_CONN_PENDING) return true;
-  fail(errno, code);
+  fail(client_->error_number, code);
   return false;
 }
 
@@ -125,11 +151,11 @@ bool MqttConnection::begin() {
 void MqttConnection::fail(int error_number, int code) {
   const bool is_tls = code == MOSQ_ERR_TLS || code == MOSQ_ERR_TLS_HANDSHAKE;
   if (is_tls) {
-    static_cast<void>(fail_with(
-        fmt::format("TLS failed{}; the broker's certificate must be for '{}' and of {}",
-                    last_complaint_.empty() ? "" : ": " + last_complaint_, options_.host,
-                    options_.ca_file.empty() ? "an authority of this system, or name mqtt.ca_file"
-                                             : options_.ca_file)));
+    static_cast<void>(fail_with(fmt::format(
+        "TLS failed{}; the broker's certificate must be for '{}' and of {}",
+        client_->last_complaint.empty() ? "" : ": " + client_->last_complaint, options_.host,
+        options_.ca_file.empty() ? "an authority of this system, or name mqtt.ca_file"
+                                 : options_.ca_file)));
   } else if (code == MOSQ_ERR_EAI) {
     static_cast<void>(fail_with("the name cannot be looked up; is mqtt.url right?"));
   } else if (code == MOSQ_ERR_ERRNO) {
@@ -180,7 +206,7 @@ bool MqttConnection::has_broken_off(bool* hung_up) {
 
 // Whether this result of the library ends the connection. Then the error is set.
 bool MqttConnection::has_failed(int code) {
-  if (code == MOSQ_ERR_SUCCESS && mosquitto_socket(client_) >= 0) return false;
+  if (code == MOSQ_ERR_SUCCESS && mosquitto_socket(handle()) >= 0) return false;
   if (ending_) return true;
   fail(errno, code == MOSQ_ERR_SUCCESS ? MOSQ_ERR_CONN_LOST : code);
   return true;
@@ -192,7 +218,7 @@ MqttConnection::Incoming MqttConnection::look_at_what_comes() const {
   std::array<std::uint8_t, 4> bytes{};
   int count = 0;
   if (options_.tls) {
-    auto* const tls = static_cast<SSL*>(mosquitto_ssl_get(client_));
+    auto* const tls = static_cast<SSL*>(mosquitto_ssl_get(handle()));
     if (tls == nullptr || SSL_is_init_finished(tls) == 0) return Incoming::kUnknown;
     count = SSL_peek(tls, bytes.data(), static_cast<int>(bytes.size()));
     if (count <= 0) return Incoming::kUnknown;
@@ -231,18 +257,20 @@ bool MqttConnection::read_answers() {
     }
     half_since_s_ = -1;
     if (incoming == Incoming::kNothing) return true;
-    if (has_failed(mosquitto_loop_read(client_, kMostPackets)) || !error_.empty()) return false;
+    if (has_failed(mosquitto_loop_read(handle(), kMostPackets)) || !error_.empty()) return false;
     if (incoming == Incoming::kUnknown) return true;
   }
   return true;
 }
 
 bool MqttConnection::step() {
+  if (beginning_ && !go_on_beginning()) return false;
+  if (beginning_) return true;
   bool hung_up = false;
   if (!connected_ && has_broken_off(&hung_up)) return false;
   if (!read_answers()) return false;
-  if (mosquitto_want_write(client_) && has_failed(mosquitto_loop_write(client_, 1))) return false;
-  if (has_failed(mosquitto_loop_misc(client_)) || !error_.empty()) return false;
+  if (mosquitto_want_write(handle()) && has_failed(mosquitto_loop_write(handle(), 1))) return false;
+  if (has_failed(mosquitto_loop_misc(handle())) || !error_.empty()) return false;
   if (connected_) return true;
   if (hung_up) {
     fail(0, MOSQ_ERR_CONN_LOST);
@@ -253,10 +281,13 @@ bool MqttConnection::step() {
   return true;
 }
 
-int MqttConnection::socket() const { return client_ == nullptr ? -1 : mosquitto_socket(client_); }
+int MqttConnection::socket() const {
+  if (beginning_) return errand_.descriptor();
+  return handle() == nullptr ? -1 : mosquitto_socket(handle());
+}
 
 bool MqttConnection::wants_to_write() const {
-  return (connected_ || !options_.tls) && mosquitto_want_write(client_);
+  return !beginning_ && (connected_ || !options_.tls) && mosquitto_want_write(handle());
 }
 
 double MqttConnection::patience_s() const {
@@ -271,7 +302,7 @@ double MqttConnection::patience_s() const {
 
 bool MqttConnection::publish(const std::string& topic, const std::string& payload, bool retain,
                              int* id) {
-  const int code = mosquitto_publish(client_, id, topic.c_str(), static_cast<int>(payload.size()),
+  const int code = mosquitto_publish(handle(), id, topic.c_str(), static_cast<int>(payload.size()),
                                      payload.data(), options_.qos, retain);
   if (code == MOSQ_ERR_SUCCESS) return true;
   fail(errno, code);
@@ -280,14 +311,15 @@ bool MqttConnection::publish(const std::string& topic, const std::string& payloa
 
 void MqttConnection::end() {
   ending_ = true;
-  static_cast<void>(mosquitto_disconnect(client_));
+  static_cast<void>(mosquitto_disconnect(handle()));
 }
 
 std::string MqttConnection::try_once(const MqttOptions& options) {
   MqttOptions of_a_stranger = options;
   // A second client with the same id would disconnect a running program.
   of_a_stranger.client_id.clear();
-  MqttConnection connection(of_a_stranger, nullptr);
+  Errand errand;
+  MqttConnection connection(of_a_stranger, nullptr, &errand);
   if (!connection.begin()) return connection.error();
   while (!connection.is_connected()) {
     pollfd socket{connection.socket(), 0, 0};

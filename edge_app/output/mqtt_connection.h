@@ -2,14 +2,16 @@
 // MqttConnection: one connection to a broker, from the attempt to its end, by libmosquitto (MQTT
 // 3.1.1). Each attempt is a new object. So nothing of an old connection is sent over a new one, and
 // what a broker retains is never overwritten by something older. For one thread, which waits until
-// socket() is ready and then calls step(). Looking up a name blocks in the resolver. If a name has
-// several addresses, the first that does not refuse at once is taken.
+// socket() is ready and then calls step(). If a name has several addresses, the first that does not
+// refuse at once is taken. The library looks up names in a call that blocks: that is the owner's
+// errand.
 
 #include <functional>
 #include <memory>
 #include <string>
 
 #include "edge_app/output/mqtt_options.h"
+#include "platform/system/errand.h"
 
 struct mosquitto;
 
@@ -23,9 +25,10 @@ class MqttConnection {
     bool retain = false;
   };
 
-  // will: what the broker publishes if the connection ends without end(); null: nothing.
-  MqttConnection(const MqttOptions& options, const Message* will);
-  ~MqttConnection();
+  // will: what the broker publishes if the connection ends without end(); null: nothing. errand:
+  // outlives the connection; the same for all of an owner, so that look-ups do not pile up.
+  MqttConnection(const MqttOptions& options, const Message* will, Errand* errand);
+  ~MqttConnection() = default;
   MqttConnection(const MqttConnection&) = delete;
   MqttConnection& operator=(const MqttConnection&) = delete;
 
@@ -42,7 +45,8 @@ class MqttConnection {
   // One line that says what failed, names the broker and says what would be right. Has no password.
   [[nodiscard]] const std::string& error() const { return error_; }
 
-  [[nodiscard]] int socket() const;  // negative: none
+  // Or what becomes readable once the name is looked up; negative: none.
+  [[nodiscard]] int socket() const;
   // What to wait for at socket(), and how long at most. During the TLS handshake the library does
   // not say what it waits for.
   [[nodiscard]] bool wants_to_read() const { return half_since_s_ < 0; }
@@ -64,7 +68,11 @@ class MqttConnection {
  private:
   enum class Incoming { kNothing, kAnswer, kHalfAnswer, kForeign, kUnknown };
 
+  struct Client;
+
+  [[nodiscard]] mosquitto* handle() const;
   [[nodiscard]] bool set_up();
+  [[nodiscard]] bool go_on_beginning();
   [[nodiscard]] Incoming look_at_what_comes() const;
   [[nodiscard]] bool read_answers();
   [[nodiscard]] bool has_broken_off(bool* hung_up);
@@ -74,13 +82,14 @@ class MqttConnection {
   [[nodiscard]] bool fail_with(const std::string& what);
 
   const MqttOptions options_;
-  mosquitto* client_ = nullptr;
+  Errand& errand_;
+  std::shared_ptr<Client> client_;  // also the errand's, which may outlive the connection
+  bool beginning_ = false;          // the errand uses client_
   bool connected_ = false;
   bool ending_ = false;
   double give_up_s_ = 0;      // monotonic time
   double half_since_s_ = -1;  // monotonic time since when an answer is incomplete; < 0: none is
   std::string error_;
-  std::string last_complaint_;  // last error of the library
   std::string set_up_error_;
   std::function<void(int)> on_published_ = [](int) {};
 

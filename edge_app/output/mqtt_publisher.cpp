@@ -73,7 +73,7 @@ void MqttPublisher::run() {
   Backoff backoff(options_.max_backoff_s);
   while (!ends_) {
     const MqttConnection::Message will{slots_[kStatus].topic, "offline", true};
-    MqttConnection connection(options_, &will);
+    MqttConnection connection(options_, &will, &errand_);
     connection.set_on_published([this](int id) { published(id); });
     if (connection.begin()) keep_connected(&connection);
     const bool was_connected = connected_.exchange(false);

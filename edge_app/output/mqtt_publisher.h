@@ -21,6 +21,7 @@
 #include "edge_app/output/mqtt_connection.h"
 #include "edge_app/output/mqtt_options.h"
 #include "edge_app/record/orientation_record.h"
+#include "platform/system/errand.h"
 #include "platform/system/file_descriptor.h"
 #include "platform/system/niced_threads.h"
 #include "platform/system/priority_mutex.h"
@@ -78,6 +79,7 @@ class MqttPublisher final : public RecordSink {
 
   const MqttOptions options_;
   const FileDescriptor news_;  // an eventfd
+  Errand errand_;              // of the connections
   NicedThreads thread_;
   std::atomic<bool> ends_{false};
   std::atomic<bool> wants_record_{false};

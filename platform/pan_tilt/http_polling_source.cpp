@@ -15,7 +15,6 @@
 namespace alidade {
 namespace {
 
-constexpr std::size_t kShownUrl = 120;  // bytes
 constexpr const char* kNoCurl = "libcurl does not start";
 constexpr long kDigest = static_cast<long>(CURLAUTH_DIGEST);
 constexpr long kBasic = static_cast<long>(CURLAUTH_BASIC);
@@ -59,7 +58,6 @@ class HttpPollingSource : public PanTiltSource {
   std::vector<std::string> take_notes() override { return notes_.take(); }
 
  private:
-  [[nodiscard]] bool is_by_tls() const { return asked_.rfind("https://", 0) == 0; }
   static std::size_t on_header(char* data, std::size_t size, std::size_t count, void* self);
   static std::size_t on_body(char* data, std::size_t size, std::size_t count, void* self);
   bool make_handle();
@@ -258,7 +256,7 @@ HttpAnswer HttpPollingSource::answer() const {
   answer.status = status();
   if (answer.status == 401) {
     const long offered = offered_methods(easy_.get());
-    const bool basic = options_.rules.permits_basic(is_by_tls());
+    const bool basic = options_.rules.permits_basic(is_by_tls(asked_));
     answer.offers_digest = (offered & (basic ? kDigest | kBasic : kDigest)) != 0;
     answer.only_basic = !basic && (offered & (kDigest | kBasic)) == kBasic;
     answer.login_error = login_error(easy_.get(), options_.user, method_);
@@ -286,7 +284,7 @@ ReadStatus HttpPollingSource::follow_redirection() {
   if (error.empty() && ++redirections_ > kMostRedirections) {
     error = "more than " + std::to_string(kMostRedirections) + " redirections";
   } else if (error.empty() && !next.takes_login && request_.body_logs_in) {
-    error = "redirected to " + shown(next.url, kShownUrl) +
+    error = "redirected to " + shown_url(next.url) +
             ": refused, as the request holds the login, which goes to url only: set url to that";
   }
   if (!error.empty()) {
@@ -317,7 +315,7 @@ ReadStatus HttpPollingSource::finish_request(CURLcode code, PanTiltSample* sampl
   }
   const HttpAnswer given = answer();
   if (given.status == 401 && request_.digest && method_ == kDigest && !options_.user.empty() &&
-      options_.rules.permits_basic(is_by_tls()) &&
+      options_.rules.permits_basic(is_by_tls(asked_)) &&
       (offered_methods(easy_.get()) & (kDigest | kBasic)) == kBasic) {
     method_ = kBasic;
     if (!make_handle()) return fail(kNoCurl);

@@ -15,7 +15,6 @@ namespace {
 
 constexpr std::size_t kMaxOnvifBody = 256 * 1024;  // bytes; many long profiles
 constexpr std::size_t kNonceBytes = 16;
-constexpr std::size_t kShownUrl = 120;
 
 // The candidate addresses of a service, tried one after the other until it answers.
 class ServiceSearch {
@@ -375,8 +374,8 @@ std::vector<std::string> OnvifConversation::notes() const {
   if (options_.ptz_path.empty() && services_.ptz.empty()) {
     notes.push_back("the device names no PTZ service; it is asked at " + ptz_.address());
   } else if (!ptz_.is_first()) {
-    notes.push_back("no PTZ service answers where the device says, '" +
-                    shown(services_.ptz, kShownUrl) + "'; it is asked at " + ptz_.address());
+    notes.push_back("no PTZ service answers where the device says, '" + shown_url(services_.ptz) +
+                    "'; it is asked at " + ptz_.address());
   }
   return notes;
 }

@@ -92,7 +92,7 @@ ReadStatus QuerySource::act(double now_s) {
       return ReadStatus::kOk;
     }
     case State::kOpening:
-      return disconnect("no connection in time; is the host there?");
+      return disconnect(link_.error());
     case State::kSettling:
       state_ = State::kIdle;
       open_ = open_ > 1 ? 0 : open_;

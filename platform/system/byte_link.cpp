@@ -1,7 +1,6 @@
 #include "platform/system/byte_link.h"
 
 #include <fcntl.h>
-#include <netdb.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <poll.h>
@@ -16,7 +15,6 @@
 #include <cerrno>
 #include <cmath>
 #include <cstring>
-#include <memory>
 
 #include "platform/system/clock.h"
 #include "platform/system/url.h"
@@ -110,11 +108,9 @@ ByteLink::ByteLink(const ByteLinkOptions& options)
     return;
   }
   kind_ = url.scheme == "tcp" ? Kind::kTcp : Kind::kUdp;
-  host_ = url.host;
-  if (host_.front() == '[' && host_.back() == ']') {
-    host_ = host_.substr(1, host_.size() - 2);
-  }
-  port_ = url.port;
+  const bool is_bracketed = url.host.front() == '[' && url.host.back() == ']';
+  host_.emplace(is_bracketed ? url.host.substr(1, url.host.size() - 2) : url.host, url.port,
+                kind_ == Kind::kTcp ? SOCK_STREAM : SOCK_DGRAM);
 }
 
 void ByteLink::stop() {
@@ -136,7 +132,7 @@ LinkStatus ByteLink::open() {
       return open_serial();
     case Kind::kTcp:
     case Kind::kUdp:
-      return open_socket();
+      return host_->begin() ? LinkStatus::kOk : lost("there can be no thread to look up the host");
     case Kind::kNone:
       break;
   }
@@ -185,28 +181,16 @@ LinkStatus ByteLink::open_serial() {
   return LinkStatus::kOk;
 }
 
-LinkStatus ByteLink::open_socket() {
-  addrinfo hints{};
-  hints.ai_family = AF_UNSPEC;
-  hints.ai_socktype = kind_ == Kind::kTcp ? SOCK_STREAM : SOCK_DGRAM;
-  hints.ai_flags = AI_NUMERICSERV;
-  addrinfo* list = nullptr;
-  const int code = ::getaddrinfo(host_.c_str(), port_.c_str(), &hints, &list);
-  if (code != 0) {
-    return lost(std::string("the host is not found: ") + ::gai_strerror(code));
+// A host may have several addresses: each try takes the next.
+LinkStatus ByteLink::connect_socket() {
+  std::string error;
+  const std::vector<HostAddress> found = host_->take(&error);
+  if (found.empty()) {
+    return lost(error);
   }
-  const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> owner(list, &::freeaddrinfo);
-  // A host may have several addresses: each try takes the next.
-  std::size_t count = 0;
-  for (const addrinfo* each = list; each != nullptr; each = each->ai_next) {
-    ++count;
-  }
-  const addrinfo* chosen = list;
-  for (std::size_t skipped = tries_++ % count; skipped > 0; --skipped) {
-    chosen = chosen->ai_next;
-  }
-  line_.reset(::socket(chosen->ai_family, chosen->ai_socktype | SOCK_NONBLOCK | SOCK_CLOEXEC,
-                       chosen->ai_protocol));
+  const HostAddress& chosen = found[tries_++ % found.size()];
+  const int type = kind_ == Kind::kTcp ? SOCK_STREAM : SOCK_DGRAM;
+  line_.reset(::socket(chosen.family(), type | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
   if (!line_.is_open()) {
     return lost(reason(errno));
   }
@@ -214,17 +198,32 @@ LinkStatus ByteLink::open_socket() {
   if (kind_ == Kind::kTcp) {
     static_cast<void>(::setsockopt(line_.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof on));
   }
-  if (::connect(line_.get(), chosen->ai_addr, chosen->ai_addrlen) != 0 && errno != EINPROGRESS) {
+  if (::connect(line_.get(), chosen.get(), chosen.size) != 0 && errno != EINPROGRESS) {
     return lost(reason(errno));
   }
   return LinkStatus::kOk;
 }
 
 LinkStatus ByteLink::finish_open(double timeout_s) {
-  if (kind_ != Kind::kTcp) {
+  if (kind_ != Kind::kTcp && kind_ != Kind::kUdp) {
     return LinkStatus::kOk;
   }
-  const LinkStatus status = wait(POLLOUT, timeout_s);
+  const double deadline_s = monotonic_now_s() + timeout_s;
+  if (!line_.is_open()) {
+    error_ = kNameNotLookedUp;
+    if (!host_->is_over()) {
+      const LinkStatus status = wait(host_->descriptor(), POLLIN, timeout_s);
+      if (status != LinkStatus::kOk) {
+        return status;
+      }
+    }
+    const LinkStatus status = connect_socket();
+    if (status != LinkStatus::kOk || kind_ == Kind::kUdp) {
+      return status;
+    }
+  }
+  error_ = "no connection in time; is the host there?";
+  const LinkStatus status = wait(line_.get(), POLLOUT, deadline_s - monotonic_now_s());
   if (status != LinkStatus::kOk) {
     return status;
   }
@@ -236,8 +235,8 @@ LinkStatus ByteLink::finish_open(double timeout_s) {
   return LinkStatus::kOk;
 }
 
-LinkStatus ByteLink::wait(short events, double timeout_s) {
-  std::array<pollfd, 2> waited = {{{stop_.get(), POLLIN, 0}, {line_.get(), events, 0}}};
+LinkStatus ByteLink::wait(int descriptor, short events, double timeout_s) {
+  std::array<pollfd, 2> waited = {{{stop_.get(), POLLIN, 0}, {descriptor, events, 0}}};
   const int ready = ::poll(waited.data(), waited.size(), poll_milliseconds(timeout_s));
   if (ready > 0 && waited[0].revents != 0) {
     return LinkStatus::kStopped;
@@ -260,7 +259,7 @@ LinkStatus ByteLink::send(std::string_view bytes) {
 
 LinkStatus ByteLink::receive(std::string* bytes, double timeout_s) {
   bytes->clear();
-  const LinkStatus status = wait(POLLIN, timeout_s);
+  const LinkStatus status = wait(line_.get(), POLLIN, timeout_s);
   if (status != LinkStatus::kOk) {
     return status;
   }

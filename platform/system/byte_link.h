@@ -5,15 +5,15 @@
 //
 // Serial: 8 data bits, no parity, 1 stop bit, raw, no flow control; one program at a time. TCP:
 // without delay of small packets. UDP: to and from one address; each receive() returns one
-// datagram. Used by one thread; stop() may be called from any other and wakes it. Host names are
-// looked up by the system's resolver, which may take long: use a numeric address where that
-// matters.
+// datagram. Used by one thread; stop() may be called from any other and wakes it.
 
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <string_view>
 
 #include "platform/system/file_descriptor.h"
+#include "platform/system/name_lookup.h"
 
 namespace alidade {
 
@@ -46,7 +46,8 @@ class ByteLink {
   ByteLink(const ByteLink&) = delete;
   ByteLink& operator=(const ByteLink&) = delete;
 
-  // Starts to open; on failure see error(). After kOk call finish_open().
+  // Starts to open; on failure see error(). After kOk call finish_open(), until it is not kTimeout
+  // or too late. A name's look-up goes on over close() and open().
   [[nodiscard]] LinkStatus open();
   [[nodiscard]] LinkStatus finish_open(double timeout_s);
   void close() { line_.reset(); }
@@ -61,7 +62,7 @@ class ByteLink {
   void stop();  // every later call that could wait returns kStopped
 
   [[nodiscard]] bool is_datagram() const { return kind_ == Kind::kUdp; }
-  // What is wrong, without the link's name. Valid after kLost and kUnusable.
+  // What is wrong, without the link's name. Valid after kLost, kUnusable and finish_open().
   [[nodiscard]] const std::string& error() const { return error_; }
   [[nodiscard]] const std::string& name() const { return options_.address; }
 
@@ -69,14 +70,13 @@ class ByteLink {
   enum class Kind { kSerial, kTcp, kUdp, kNone };
 
   LinkStatus open_serial();
-  LinkStatus open_socket();
-  LinkStatus wait(short events, double timeout_s);
+  LinkStatus connect_socket();
+  LinkStatus wait(int descriptor, short events, double timeout_s);
   LinkStatus lost(const std::string& error);
 
   ByteLinkOptions options_;
   Kind kind_ = Kind::kNone;
-  std::string host_;
-  std::string port_;
+  std::optional<NameLookup> host_;  // TCP and UDP
   std::size_t tries_ = 0;
   FileDescriptor line_;  // or socket
   FileDescriptor stop_;  // readable for good once stop() was called

@@ -8,12 +8,8 @@
 namespace alidade {
 namespace {
 
-constexpr std::size_t kMostShown = 120;  // bytes of a foreign address
-
-bool is_by_tls(const Url& url) { return !url.scheme.empty() && url.scheme.back() == 's'; }
-
 std::string without_tls(const std::string& scheme) {
-  return !scheme.empty() && scheme.back() == 's' ? scheme.substr(0, scheme.size() - 1) : scheme;
+  return is_by_tls(scheme) ? scheme.substr(0, scheme.size() - 1) : scheme;
 }
 
 std::string in_small_letters(std::string text) {
@@ -53,13 +49,13 @@ Redirection judge_redirection(const Url& configured, const std::string& asked,
   std::string ignored;
   const bool is_url = parse_url(resolved_url(asked, told), &url, &ignored);
   const std::string what =
-      "redirected to " + shown(is_url ? url.bare : told.substr(told.rfind('@') + 1), kMostShown);
+      "redirected to " + shown_url(is_url ? url.bare : told.substr(told.rfind('@') + 1));
   if (!is_url || url.host.empty() || without_tls(url.scheme) != without_tls(configured.scheme)) {
     result.error = what + ", which is no address of this kind: refused";
     return result;
   }
   const std::string other = difference(configured, url);
-  if (is_by_tls(configured) && !is_by_tls(url)) {
+  if (is_by_tls(configured.scheme) && !is_by_tls(url.scheme)) {
     result.error = what + ", away from TLS: refused";
   } else if (other.empty()) {
     result.takes_login = true;
@@ -75,7 +71,7 @@ Redirection judge_redirection(const Url& configured, const std::string& asked,
 }
 
 std::string login_wanted_elsewhere(const std::string& url) {
-  return "redirected to " + shown(url, kMostShown) +
+  return "redirected to " + shown_url(url) +
          ", which wants a login (401); it goes to url only: set url to that";
 }
 

@@ -21,11 +21,8 @@ void* run_niced(void* argument) {
   return nullptr;
 }
 
-}  // namespace
-
-bool NicedThreads::start(std::function<void()> run) {
+bool start_niced(std::function<void()> run, int detached, pthread_t* thread) {
   auto argument = std::make_unique<std::function<void()>>(std::move(run));
-  threads_.reserve(threads_.size() + 1);
   pthread_attr_t attributes;
   ::pthread_attr_init(&attributes);
   ::pthread_attr_setstacksize(&attributes, kStackBytes);
@@ -33,11 +30,25 @@ bool NicedThreads::start(std::function<void()> run) {
   ::pthread_attr_setinheritsched(&attributes, PTHREAD_EXPLICIT_SCHED);
   ::pthread_attr_setschedpolicy(&attributes, SCHED_OTHER);
   ::pthread_attr_setschedparam(&attributes, &none);
-  pthread_t thread{};
-  const bool started = ::pthread_create(&thread, &attributes, run_niced, argument.get()) == 0;
+  ::pthread_attr_setdetachstate(&attributes, detached);
+  const bool started = ::pthread_create(thread, &attributes, run_niced, argument.get()) == 0;
   ::pthread_attr_destroy(&attributes);
   if (!started) return false;
   static_cast<void>(argument.release());  // the thread owns it now
+  return true;
+}
+
+}  // namespace
+
+bool start_detached_niced(std::function<void()> run) {
+  pthread_t thread{};
+  return start_niced(std::move(run), PTHREAD_CREATE_DETACHED, &thread);
+}
+
+bool NicedThreads::start(std::function<void()> run) {
+  threads_.reserve(threads_.size() + 1);
+  pthread_t thread{};
+  if (!start_niced(std::move(run), PTHREAD_CREATE_JOINABLE, &thread)) return false;
   threads_.push_back(thread);
   return true;
 }

@@ -9,6 +9,9 @@
 
 namespace alidade {
 
+// A thread like those of NicedThreads that nobody waits for. False: the system cannot start it.
+[[nodiscard]] bool start_detached_niced(std::function<void()> run);
+
 class NicedThreads {
  public:
   NicedThreads() = default;

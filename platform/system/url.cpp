@@ -3,6 +3,7 @@
 #include <curl/curl.h>
 
 #include <memory>
+#include <string_view>
 
 #include "platform/system/shown.h"
 
@@ -60,6 +61,11 @@ bool parse_url(const std::string& text, Url* url, std::string* error) {
   curl_url_set(handle.get(), CURLUPART_PASSWORD, nullptr, 0);
   url->bare = part(handle, CURLUPART_URL, kAnyScheme);
   return true;
+}
+
+bool is_by_tls(std::string_view url_or_scheme) {
+  const std::string_view scheme = url_or_scheme.substr(0, url_or_scheme.find("://"));
+  return scheme == "https" || scheme == "rtsps" || scheme == "mqtts";
 }
 
 std::string resolved_url(const std::string& base, const std::string& told) {

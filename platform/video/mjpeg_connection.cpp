@@ -26,7 +26,6 @@ constexpr int kUselessInARow = 1000;
 // woken at most once per pause.
 constexpr int kWakesForAPicture = 256;
 constexpr auto kPauseOfWakes = std::chrono::milliseconds(1);
-constexpr std::size_t kShownUrl = 120;  // bytes
 constexpr long kDigest = static_cast<long>(CURLAUTH_DIGEST);
 constexpr long kDigestOrBasic = static_cast<long>(CURLAUTH_DIGEST | CURLAUTH_BASIC);
 
@@ -44,7 +43,7 @@ void MjpegConnection::interrupt() { curl_multi_wakeup(multi_.get()); }
 bool MjpegConnection::make_handle(const std::string& url, bool logs_in) {
   asked_ = url;
   logs_in_ = logs_in;
-  methods_ = options_.rules.permits_basic(is_by_tls()) ? kDigestOrBasic : kDigest;
+  methods_ = options_.rules.permits_basic(is_by_tls(asked_)) ? kDigestOrBasic : kDigest;
   easy_ = make_http_handle(logs_in ? options_.user : "", options_.password, methods_, curl_error_);
   if (!easy_) {
     return false;
@@ -167,7 +166,7 @@ ReadStatus MjpegConnection::receive(const std::function<bool()>& ending, std::st
     }
   }
   *error = "more than " + std::to_string(kMostRedirections) + " redirections, the last to " +
-           shown(asked_, kShownUrl);
+           shown_url(asked_);
   return ReadStatus::kDisconnected;
 }
 
@@ -222,7 +221,7 @@ void MjpegConnection::wait_for_bytes(double left_s) {
 // Not for TLS: a record need not be as long as its content.
 void MjpegConnection::set_low_water(std::size_t bytes) {
   const auto wanted = static_cast<int>(std::min<std::size_t>(bytes, INT_MAX));
-  if (is_by_tls() || socket_ == CURL_SOCKET_BAD || wanted == low_water_) {
+  if (is_by_tls(asked_) || socket_ == CURL_SOCKET_BAD || wanted == low_water_) {
     return;
   }
   if (::setsockopt(socket_, SOL_SOCKET, SO_RCVLOWAT, &wanted, sizeof wanted) == 0) {

@@ -38,7 +38,6 @@ class MjpegConnection {
   [[nodiscard]] std::int64_t damaged() const { return damaged_; }
 
  private:
-  [[nodiscard]] bool is_by_tls() const { return asked_.rfind("https://", 0) == 0; }
   static int on_socket(void* self, curl_socket_t socket, curlsocktype purpose);
   static int on_close(void* self, curl_socket_t socket);
   static std::size_t on_header(char* data, std::size_t size, std::size_t count, void* self);

@@ -67,7 +67,8 @@ void RtpConnection::FreeIo::operator()(AVIOContext* io) const {
   avio_context_free(&io);
 }
 
-RtpConnection::RtpConnection(const RtpSourceOptions& options) : options_(options) {
+RtpConnection::RtpConnection(const RtpSourceOptions& options, SenderChoice* choice)
+    : options_(options), choice_(*choice) {
   Url url;
   if (options_.url.find("://") == std::string::npos) {
     std::string sdp;
@@ -75,9 +76,9 @@ RtpConnection::RtpConnection(const RtpSourceOptions& options) : options_(options
     if (!read_text(options_.url, &sdp, &error)) {
       no_transport_ = "no usable SDP description: " + error;
     }
-    transport_ = std::make_unique<UdpTransport>(sdp);
+    transport_ = std::make_unique<UdpTransport>(sdp, choice);
   } else if (parse_url(options_.url, &url, &no_transport_) && url.scheme == "rtp") {
-    transport_ = std::make_unique<UdpTransport>(sdp_of(url, options_.format));
+    transport_ = std::make_unique<UdpTransport>(sdp_of(url, options_.format), choice);
   } else {
     transport_ = std::make_unique<RtspSession>(options_);
   }
@@ -281,6 +282,7 @@ ReadStatus RtpConnection::read(AccessUnit* unit, std::string* error) {
   const ReadStatus status = read_picture(unit, error);
   if (status != ReadStatus::kOk) return status;
   any_picture_ = true;
+  unit->trial = choice_.trial();
   const AVPacket& packet = *unit->packet;
   if (packet.pts != AV_NOPTS_VALUE && another_sender(unit)) {
     *error = "the sender's clock jumped: it began anew";

@@ -19,6 +19,7 @@
 #include "platform/video/picture_ends.h"
 #include "platform/video/rtp_source.h"
 #include "platform/video/rtp_transport.h"
+#include "platform/video/sender_choice.h"
 #include "platform/video/stamp_guard.h"
 #include "platform/video/stream_filter.h"
 
@@ -37,12 +38,13 @@ struct AccessUnit {
   int width = 0;
   int height = 0;
   bool too_large = false;  // larger than RtpSourceOptions::max_pixels
+  int trial = 0;           // plain RTP: SenderChoice::trial()
 };
 
 class RtpConnection {
  public:
-  // options.url must be without credentials. options must outlive the connection.
-  explicit RtpConnection(const RtpSourceOptions& options);
+  // options.url must be without credentials. options and choice must outlive the connection.
+  RtpConnection(const RtpSourceOptions& options, SenderChoice* choice);
   ~RtpConnection();
   RtpConnection(const RtpConnection&) = delete;
   RtpConnection& operator=(const RtpConnection&) = delete;
@@ -90,6 +92,7 @@ class RtpConnection {
   ReadStatus nothing_received(std::string* error) const;
 
   const RtpSourceOptions& options_;
+  SenderChoice& choice_;
   std::string no_transport_;  // why transport_ is null
   std::unique_ptr<RtpTransport> transport_;
   IoPtr packets_;

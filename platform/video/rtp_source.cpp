@@ -48,6 +48,7 @@ class RtpSource : public FrameSource {
 
   void stop() override { thread_.stop(); }
   bool refuse(const std::string& reason) override {
+    choice_.give_up();
     thread_.refuse(reason);
     return true;
   }
@@ -87,6 +88,7 @@ class RtpSource : public FrameSource {
   // A peer's content ends the program only before the first frame; later it ends the connection.
   ReadStatus fail_or_refuse(const std::string& error) {
     if (next_frame_ == 0) return fail(error);
+    choice_.give_up();
     thread_.refuse(error);
     return ReadStatus::kTimeout;
   }
@@ -109,6 +111,8 @@ class RtpSource : public FrameSource {
   // reader. Second: after a loss.
   std::atomic<double> no_first_key_since_s_{-1};
   std::atomic<double> no_key_after_loss_since_s_{-1};
+
+  SenderChoice choice_{options_.timeout_s};  // plain RTP
 
   std::mutex mutex_;
   RtpConnection* connection_ = nullptr;  // guarded by mutex_
@@ -205,7 +209,7 @@ std::string RtpSource::waiting() const {
 
 // One connection from start to end.
 ReadStatus RtpSource::receive_connection(std::string* error) {
-  RtpConnection connection(options_);
+  RtpConnection connection(options_, &choice_);
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     connection_ = &connection;
@@ -422,6 +426,7 @@ ReadStatus RtpSource::decode(AccessUnit* unit, Picture* picture) {
   *unit = std::move(in_decoder_.front());
   in_decoder_.pop_front();
   size_known_ = true;
+  choice_.keep(unit->trial);
   width_ = picture->width;
   height_ = picture->height;
   no_key_after_loss_since_s_ = -1;

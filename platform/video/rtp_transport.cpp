@@ -140,9 +140,10 @@ double age_of(msghdr* message) {
 }  // namespace
 
 ReadStatus RtpPorts::open(const std::string& address, int port, const UdpSenders& senders,
-                          std::string* error) {
+                          std::string* error, SenderChoice* choice) {
   const Listening to = listening_to(address);
   senders_ = senders;
+  choice_ = choice;
   for (int i = 0; i < 2; ++i) {
     Socket& socket = sockets_[static_cast<std::size_t>(i)];
     socket = {open_socket(to, port + i, senders), monotonic_now_s()};
@@ -169,10 +170,12 @@ ReadStatus RtpPorts::take(Socket* socket, std::uint8_t* data, std::size_t capaci
   message.msg_controllen = control.size();
   const double before_s = monotonic_now_s();
   const ssize_t size = ::recvmsg(socket->descriptor.get(), &message, 0);
-  if (size > 0 && senders_.take(from)) {
+  const auto bytes = static_cast<std::size_t>(std::max<ssize_t>(size, 0));
+  if (size > 0 && senders_.take(from) &&
+      (choice_ == nullptr || choice_->take(from, data, bytes, before_s))) {
     const double age_s = age_of(&message);
     const double now_s = monotonic_now_s();
-    packet->size = static_cast<std::size_t>(size);
+    packet->size = bytes;
     packet->arrival_s = std::max(socket->not_before_s, now_s - age_s);
     socket->not_before_s = packet->arrival_s;
     return ReadStatus::kOk;
@@ -227,7 +230,14 @@ ReadStatus UdpTransport::open(double /*deadline_s*/, std::string* sdp, std::stri
              "'; write the sender's numeric address";
     return ReadStatus::kFailed;
   }
-  return ports_.open(video->address, video->port, senders, error);
+  choice_.begin(video->payload_type, video->source, senders.empty(), monotonic_now_s());
+  return ports_.open(video->address, video->port, senders, error, &choice_);
+}
+
+ReadStatus UdpTransport::receive(double deadline_s, std::uint8_t* data, std::size_t capacity,
+                                 ReceivedPacket* packet, std::string* error) {
+  if (choice_.trial_is_over(monotonic_now_s(), error)) return ReadStatus::kDisconnected;
+  return ports_.receive(deadline_s, data, capacity, packet, error);
 }
 
 }  // namespace alidade

@@ -14,6 +14,7 @@
 
 #include "platform/system/file_descriptor.h"
 #include "platform/video/frame_source.h"
+#include "platform/video/sender_choice.h"
 #include "platform/video/udp_senders.h"
 
 namespace alidade {
@@ -58,9 +59,9 @@ class RtpPorts {
   static constexpr double kGather_s = 150e-6;
 
   // address: the multicast group, or the sender's address. senders: whose packets are accepted, on
-  // both ports.
+  // both ports. choice, which must outlive the ports, decides further; null: all of theirs.
   [[nodiscard]] ReadStatus open(const std::string& address, int port, const UdpSenders& senders,
-                                std::string* error);
+                                std::string* error, SenderChoice* choice = nullptr);
   [[nodiscard]] ReadStatus receive(double deadline_s, std::uint8_t* data, std::size_t capacity,
                                    ReceivedPacket* packet, std::string* error);
   void interrupt() { interrupted_ = true; }  // thread-safe
@@ -78,27 +79,30 @@ class RtpPorts {
 
   std::atomic<bool> interrupted_{false};
   UdpSenders senders_;
+  SenderChoice* choice_ = nullptr;
   std::array<Socket, 2> sockets_;  // RTP, RTCP
   bool amid_picture_ = false;      // the last RTP packet was not the end of a picture
 };
 
-// Plain RTP, from a session description or an rtp:// URL.
+// Plain RTP, from a session description or an rtp:// URL. Packets of others than the senders and
+// the SSRC that the description names are left out; without a sender's address, choice chooses.
 class UdpTransport : public RtpTransport {
  public:
-  explicit UdpTransport(std::string sdp) : sdp_(std::move(sdp)) {}
+  UdpTransport(std::string sdp, SenderChoice* choice) : sdp_(std::move(sdp)), choice_(*choice) {}
   [[nodiscard]] ReadStatus open(double deadline_s, std::string* sdp, std::string* error) override;
   [[nodiscard]] ReadStatus receive(double deadline_s, std::uint8_t* data, std::size_t capacity,
-                                   ReceivedPacket* packet, std::string* error) override {
-    return ports_.receive(deadline_s, data, capacity, packet, error);
-  }
+                                   ReceivedPacket* packet, std::string* error) override;
   void interrupt() override { ports_.interrupt(); }
-  [[nodiscard]] std::int64_t foreign() const override { return ports_.senders().foreign(); }
+  [[nodiscard]] std::int64_t foreign() const override {
+    return ports_.senders().foreign() + choice_.foreign();
+  }
   [[nodiscard]] std::string foreign_kind() const override {
-    return ports_.senders().foreign_kind();
+    return choice_.foreign() > 0 ? choice_.foreign_kind() : ports_.senders().foreign_kind();
   }
 
  private:
   std::string sdp_;
+  SenderChoice& choice_;
   RtpPorts ports_;
 };
 

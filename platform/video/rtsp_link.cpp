@@ -11,6 +11,7 @@
 #include <gst/rtsp/gstrtspurl.h>
 
 #include "platform/system/clock.h"
+#include "platform/system/url.h"
 #include "platform/system/watchdog.h"
 #include "platform/video/rtsp_message.h"
 
@@ -63,7 +64,7 @@ ReadStatus RtspLink::connect(const std::string& address, double deadline_s, std:
     return ReadStatus::kFailed;
   }
   const std::unique_ptr<GstRTSPUrl, void (*)(GstRTSPUrl*)> url(parsed, &gst_rtsp_url_free);
-  const bool by_tls = (url->transports & GST_RTSP_LOWER_TRANS_TLS) != 0;
+  const bool by_tls = is_by_tls(address);
   const int usual_port = by_tls ? kRtspsPort : kRtspPort;
   const guint16 port = url->port == 0 ? static_cast<guint16>(usual_port) : url->port;
   close();

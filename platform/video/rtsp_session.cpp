@@ -260,7 +260,7 @@ ReadStatus RtspSession::log_in(RtspMessage* answer, bool refused, std::string* e
 
 // From here on each request carries the login.
 std::string RtspSession::accept_challenge(RtspMessage* answer) {
-  const bool basic = options_.rules.permits_basic(url_.rfind("rtsps://", 0) == 0);
+  const bool basic = options_.rules.permits_basic(is_by_tls(url_));
   bool offers_basic = false;
   GstRTSPAuthCredential** offered =
       gst_rtsp_message_parse_auth_credentials(answer->get(), GST_RTSP_HDR_WWW_AUTHENTICATE);

@@ -29,6 +29,13 @@ std::vector<std::string> senders_in(const std::string& source_filter) {
   return senders;
 }
 
+// "1234 cname:..."
+std::optional<std::uint32_t> source_in_attribute(const std::string& ssrc) {
+  std::istringstream words(ssrc);
+  std::uint32_t source = 0;
+  return words >> source ? std::optional<std::uint32_t>(source) : std::nullopt;
+}
+
 }  // namespace
 
 std::optional<VideoDescription> find_video(const std::string& sdp) {
@@ -62,6 +69,7 @@ std::optional<VideoDescription> find_video(const std::string& sdp) {
     if (video.senders.empty()) {
       video.senders = senders_in(text(gst_sdp_message_get_attribute_val(parsed, "source-filter")));
     }
+    video.source = source_in_attribute(text(gst_sdp_media_get_attribute_val(media, "ssrc")));
     return video;
   }
   return std::nullopt;

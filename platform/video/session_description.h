@@ -1,6 +1,7 @@
 #pragma once
 // Reads the first video of a session description (SDP, RFC 8866) by GStreamer's parser. No I/O.
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -15,6 +16,7 @@ struct VideoDescription {
   std::string session_control;  // a=control of the session
   // Senders by a=source-filter (RFC 4570); empty: not given. Only `incl` is considered.
   std::vector<std::string> senders;
+  std::optional<std::uint32_t> source;  // the first SSRC by a=ssrc (RFC 5576)
 };
 
 // nullopt if the text describes no video.

@@ -58,13 +58,17 @@ bool UdpSenders::take(const sockaddr_storage& from) {
   return false;
 }
 
+std::string UdpSenders::text_of(const Bytes& address) {
+  const bool is_ipv4 = std::equal(kMapped.begin(), kMapped.end(), address.begin());
+  char text[INET6_ADDRSTRLEN] = "";
+  ::inet_ntop(is_ipv4 ? AF_INET : AF_INET6, address.data() + (is_ipv4 ? kMapped.size() : 0), text,
+              sizeof text);
+  return text;
+}
+
 std::string UdpSenders::foreign_kind() const {
   if (!last_foreign_) return "";
-  const bool is_ipv4 = std::equal(kMapped.begin(), kMapped.end(), last_foreign_->begin());
-  char text[INET6_ADDRSTRLEN] = "";
-  ::inet_ntop(is_ipv4 ? AF_INET : AF_INET6, last_foreign_->data() + (is_ipv4 ? kMapped.size() : 0),
-              text, sizeof text);
-  return std::string("another address (") + text + " in place of " + names_.front() + ")";
+  return "another address (" + text_of(*last_foreign_) + " in place of " + names_.front() + ")";
 }
 
 }  // namespace alidade

@@ -15,6 +15,11 @@ namespace alidade {
 
 class UdpSenders {
  public:
+  using Bytes = std::array<std::uint8_t, 16>;  // IPv6, or IPv4 mapped to IPv6
+  // nullopt: neither.
+  [[nodiscard]] static std::optional<Bytes> bytes_of(const sockaddr_storage& address);
+  [[nodiscard]] static std::string text_of(const Bytes& address);
+
   // False: not a numeric address.
   [[nodiscard]] bool add(const std::string& address);
   // True if none was added: all senders are accepted.
@@ -29,9 +34,6 @@ class UdpSenders {
   [[nodiscard]] std::string foreign_kind() const;
 
  private:
-  using Bytes = std::array<std::uint8_t, 16>;  // IPv6, or IPv4 mapped to IPv6
-  static std::optional<Bytes> bytes_of(const sockaddr_storage& address);
-
   std::vector<Bytes> addresses_;
   std::vector<std::string> names_;
   std::int64_t foreign_ = 0;

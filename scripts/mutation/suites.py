@@ -6,7 +6,7 @@ from .catalogue import ListError
 
 COMMAND = re.compile(r"^[ \t]*(\w+)\s*\(([^()]*(?:\([^()]*\)[^()]*)*)\)", re.M)
 TEST = re.compile(r"^(TEST|TEST_F|TEST_P|TYPED_TEST|TYPED_TEST_P)\(\s*(\w+)\s*,\s*(\w+)\s*\)", re.M)
-INSTANCE = re.compile(r"^INSTANTIATE_TEST_SUITE_P\(\s*(\w+)\s*,\s*(\w+)", re.M)
+INSTANCE = re.compile(r"^INSTANTIATE_TEST_SUITE_P\(\s*(\w*)\s*,\s*(\w+)", re.M)
 TYPED_INSTANCE = re.compile(r"^INSTANTIATE_TYPED_TEST_SUITE_P\(\s*(\w+)\s*,\s*(\w+)", re.M)
 INCLUDED = re.compile(r'^#include "(test/[^"]+)"', re.M)
 
@@ -59,7 +59,8 @@ def tests_in(text):
             yield f"{suite}/0.{case}"
         else:
             for prefix in prefixes.get(suite, []):
-                yield f"{prefix}/{suite}.{case}/0" if kind == "TEST_P" else f"{prefix}/{suite}/0.{case}"
+                instance = f"{prefix}/{suite}" if prefix else suite
+                yield f"{instance}.{case}/0" if kind == "TEST_P" else f"{instance}/0.{case}"
 
 
 class Suites:

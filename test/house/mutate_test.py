@@ -202,13 +202,15 @@ TEST_P(Each,
 INSTANTIATE_TEST_SUITE_P(
     Some, Each, testing::Values(1));
 INSTANTIATE_TEST_SUITE_P(More, Each, testing::Values(2));
+INSTANTIATE_TEST_SUITE_P(, Bare, testing::Values(3));
+TEST_P(Bare, Works) {
 TYPED_TEST(Typed, Works) {
 TEST_P(Forgotten, Works) {
 // TEST(Comment, IsNone)
 """
         names = list(suites.tests_in(text))
-        self.assertEqual(names, ["Plain.Works", "Some/Each.Works/0", "More/Each.Works/0", "Typed/0.Works"])
-        for wanted, taken in (("*", names), ("Each.*", []), ("*/Each.*", names[1:3]), ("Typed/*", names[3:]),
+        self.assertEqual(names, ["Plain.Works", "Some/Each.Works/0", "More/Each.Works/0", "Bare.Works/0", "Typed/0.Works"])
+        for wanted, taken in (("*", names), ("Each.*", []), ("*/Each.*", names[1:3]), ("Bare.*", names[3:4]), ("Typed/*", names[4:]),
                               ("Plain.*:More/*", [names[0], names[2]]), ("*-*/*", names[:1]), ("-Plain.*", names[1:])):
             self.assertEqual([name for name in names if suites.takes(wanted, name)], taken, wanted)
 

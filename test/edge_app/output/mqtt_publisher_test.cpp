@@ -167,7 +167,8 @@ TEST(MqttPublisher, TheBrokerSaysOfflineWhenThePublisherDies) {
   {
     // As a process that is killed: its socket is closed, and no farewell was said.
     const MqttConnection::Message will{"site/mast/status", "offline", true};
-    MqttConnection connection(broker.options(), &will);
+    Errand errand;
+    MqttConnection connection(broker.options(), &will, &errand);
     ASSERT_TRUE(connection.begin());
     while (!connection.is_connected()) ASSERT_TRUE(connection.step()) << connection.error();
     int id = 0;
@@ -367,7 +368,8 @@ TEST_P(MqttConnectionTo, IsEnded) {
   MqttOptions options;
   options.host = "127.0.0.1";
   options.port = server.port();
-  MqttConnection connection(options, nullptr);
+  Errand errand;
+  MqttConnection connection(options, nullptr, &errand);
   ASSERT_TRUE(connection.begin());
   const double end_s = monotonic_now_s() + kPatience_s;
   while (connection.step() && monotonic_now_s() < end_s) ::poll(nullptr, 0, 5);

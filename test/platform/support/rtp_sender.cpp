@@ -36,7 +36,8 @@ bool is_taken(int port) {
 
 bool rtp_port_taken(int port) { return is_taken(port) && is_taken(port + 1); }
 
-RtpSender::RtpSender(Codec codec, int port, double first_time_s, int packet_bytes)
+RtpSender::RtpSender(Codec codec, int port, double first_time_s, int packet_bytes,
+                     const std::string& from, const std::string& to)
     : first_time_s_(first_time_s), began_utc_us_(av_gettime()) {
   const bool mjpeg = codec == Codec::kMjpeg;
   const bool h265 = codec == Codec::kH265;
@@ -66,8 +67,9 @@ RtpSender::RtpSender(Codec codec, int port, double first_time_s, int packet_byte
   }
   must(avcodec_open2(encoder_.get(), encoder, nullptr));
 
-  const std::string url =
-      "rtp://127.0.0.1:" + std::to_string(port) + "?pkt_size=" + std::to_string(packet_bytes);
+  const std::string url = "rtp://" + to + ":" + std::to_string(port) +
+                          "?pkt_size=" + std::to_string(packet_bytes) +
+                          (from.empty() ? "" : "&localaddr=" + from);
   must(avformat_alloc_output_context2(&format_, nullptr, "rtp", url.c_str()));
   format_->flags |= AVFMT_FLAG_BITEXACT;  // sequence numbers begin at zero, not at a random one
   // Lets the RTCP reports say that first_time_s is now.

@@ -20,7 +20,9 @@ class RtpSender {
   static int grey_of(std::int64_t n) { return 40 + static_cast<int>(n * 7 % 160); }
 
   // H.264 and H.265 have a key frame every 10 pictures and their parameter sets in band.
-  RtpSender(Codec codec, int port, double first_time_s = 1, int packet_bytes = 1200);
+  // from: its numeric address; empty: the system's choice. to: an address or a group.
+  RtpSender(Codec codec, int port, double first_time_s = 1, int packet_bytes = 1200,
+            const std::string& from = "", const std::string& to = "127.0.0.1");
   ~RtpSender();
   RtpSender(const RtpSender&) = delete;
   RtpSender& operator=(const RtpSender&) = delete;

@@ -50,5 +50,14 @@ TEST(Url, ShowsAUrlItCannotParseOnOneLine) {
   EXPECT_EQ(url.bare, "cam\\nera\\x1b[2J");
 }
 
+TEST(Url, IsByTlsAsItsSchemeSays) {
+  for (const char* by_tls : {"https://camera", "rtsps://camera/x", "mqtts://broker", "https"}) {
+    EXPECT_TRUE(is_by_tls(by_tls)) << by_tls;
+  }
+  for (const char* plain : {"http://camera", "rtsp://https://x", "mqtt://broker", "s", "", "wss"}) {
+    EXPECT_FALSE(is_by_tls(plain)) << plain;
+  }
+}
+
 }  // namespace
 }  // namespace alidade

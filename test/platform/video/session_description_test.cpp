@@ -16,6 +16,15 @@ TEST(SessionDescription, TellsOfTheFirstVideo) {
   EXPECT_EQ(video->session_control, "*");
 }
 
+TEST(SessionDescription, TellsOfTheSource) {
+  const std::string video = "v=0\nm=video 5004 RTP/AVP 26\n";
+  EXPECT_EQ(find_video(video)->source, std::nullopt);
+  EXPECT_EQ(find_video(video + "a=ssrc:4294967295 cname:x\na=ssrc:7 cname:x\n")->source,
+            4294967295U);
+  EXPECT_EQ(find_video(video + "a=ssrc:4294967296 cname:x\n")->source, std::nullopt);
+  EXPECT_EQ(find_video(video + "a=ssrc:x\n")->source, std::nullopt);
+}
+
 TEST(SessionDescription, TellsOfNoVideoOnAPortThatThereIsNot) {
   EXPECT_TRUE(find_video("v=0\nm=video 65535 RTP/AVP 26\n"));
   EXPECT_FALSE(find_video("v=0\nm=video 65536 RTP/AVP 26\n"));

@@ -1,0 +1,36 @@
+#pragma once
+// Errand: one call at a time that blocks for as long as it likes and cannot be interrupted, such as
+// the system's look-up of a name, on a thread of its own. The owner waits for descriptor() as long
+// as it wants, and may go away meanwhile. So the call must own what it uses. Thread: niced,
+// detached, with a small stack. One thread at a time.
+
+#include <atomic>
+#include <functional>
+#include <memory>
+
+#include "platform/system/file_descriptor.h"
+
+namespace alidade {
+
+// The message about an errand that is a look-up.
+constexpr const char* kNameNotLookedUp =
+    "the host's name is not looked up in time; does the name server answer?";
+
+class Errand {
+ public:
+  // False: the previous call has not returned, or the system cannot start a thread.
+  [[nodiscard]] bool begin(std::function<void()> call);
+  // The last call, if any, has returned; what it wrote can be read.
+  [[nodiscard]] bool is_over() const { return !state_ || state_->over; }
+  // Readable from then on; negative: none has begun.
+  [[nodiscard]] int descriptor() const { return state_ ? state_->event.get() : -1; }
+
+ private:
+  struct State {
+    FileDescriptor event;
+    std::atomic<bool> over{false};
+  };
+  std::shared_ptr<State> state_;  // also the thread's
+};
+
+}  // namespace alidade

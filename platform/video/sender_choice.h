@@ -1,0 +1,82 @@
+#pragma once
+// SenderChoice: whose packets of plain RTP are the video, where the description names no sender's
+// address: anyone can send to an open port or to a group.
+//
+//   on trial  one sender, an address with its SSRC, is followed: the first that comes. If none of
+//             its pictures can be decoded within timeout_s, doubled at each further trial, and
+//             others send, the one of them with the fewest trials is next.
+//   kept      once a picture is decoded, for as long as packets come from its address without a
+//             pause of timeout_s. A new SSRC at that address is StreamFilter's matter.
+//
+// Packets of others are foreign. Outlives connections. Thread-safe.
+
+#include <sys/socket.h>
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "platform/video/udp_senders.h"
+
+namespace alidade {
+
+class SenderChoice {
+ public:
+  static constexpr std::size_t kMostKnown = 16;
+
+  explicit SenderChoice(double timeout_s) : timeout_s_(timeout_s) {}
+
+  // At the start of a connection. payload_type < 0: any. source: the SSRC that the description
+  // names; others are foreign. by_address: it names no address either.
+  void begin(int payload_type, std::optional<std::uint32_t> source, bool by_address, double now_s);
+  // True if this packet, RTP or RTCP, is to be taken.
+  [[nodiscard]] bool take(const sockaddr_storage& from, const std::uint8_t* data, std::size_t size,
+                          double now_s);
+  // True if another sender is to be tried, on a new connection; *error says so.
+  [[nodiscard]] bool trial_is_over(double now_s, std::string* error) const;
+
+  // Names the sender of a connection; changes with begin().
+  [[nodiscard]] int trial() const;
+  // A picture of that trial was decoded.
+  void keep(int trial);
+  // The kept sender's pictures are of no use.
+  void give_up();
+
+  [[nodiscard]] std::int64_t foreign() const;
+  [[nodiscard]] std::string foreign_kind() const;  // of the last; empty: none
+
+ private:
+  struct Sender {
+    UdpSenders::Bytes address{};
+    std::uint32_t source = 0;
+    double heard_s = 0;
+    int trials = 0;
+  };
+
+  [[nodiscard]] bool is_heard(const Sender& sender, double now_s) const {
+    return now_s - sender.heard_s <= timeout_s_;
+  }
+  bool hear(const UdpSenders::Bytes& address, std::uint32_t source, double now_s);
+  void follow(std::size_t which, double now_s);
+  bool leave_out(const UdpSenders::Bytes& address, std::uint32_t source);
+  [[nodiscard]] static std::string name_of(const UdpSenders::Bytes& address, std::uint32_t source);
+
+  const double timeout_s_;
+  mutable std::mutex mutex_;  // guards the following
+  int payload_type_ = -1;
+  std::optional<std::uint32_t> source_;
+  bool by_address_ = true;
+  std::vector<Sender> known_;            // at most kMostKnown
+  std::optional<std::size_t> followed_;  // of known_
+  bool kept_ = false;
+  double since_s_ = 0;  // start of the trial
+  int trial_ = 0;
+  std::int64_t foreign_ = 0;
+  std::string foreign_kind_;
+};
+
+}  // namespace alidade
