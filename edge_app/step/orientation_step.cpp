@@ -28,10 +28,13 @@ std::unique_ptr<OeMode> make_oe_mode(const OeOptions& options) {
 }
 
 OrientationStep::OrientationStep(const OrientationStepOptions& options)
-    : options_(options),
+    : has_telemetry_(options.has_telemetry),
+      follow_points_(options.follow_points),
+      connections_sigma_s_(options.minimum_delay_sigma_s),
       video_clock_(options.video_clock, options.video_stamp_sigma_s, options.wait_for_pace),
-      telemetry_clock_(options.telemetry_clock),
-      telemetry_(empty_telemetry(false)),
+      now_{options.calibration, options.calibrated, options.zoom_curve},
+      telemetry_({options.telemetry_clock, options.telemetry_stamp_sigma_s, options.telemetry_noise,
+                  options.telemetry_limits, options.wait_for_pace}),
       zoom_(options.zoom_tolerance),
       lens_(options.oe ? options.oe->lens.belief : ReadingBeliefOptions()),
       // A stored calibration was made over another connection.
@@ -76,63 +79,13 @@ void allow_for_lasting_error(double sigma_s, InterpolatedPanTilt* measured) {
 
 }  // namespace
 
-OrientationStep::Telemetry OrientationStep::empty_telemetry(bool filtered) const {
-  // Filtered times share the error of their line. Polled times have an error each, which a bound
-  // beyond every stamp's sigma expresses.
-  constexpr double kAllOwn_s = 1e3;
-  TelemetryNoise noise = options_.telemetry_noise;
-  if (!filtered) noise.period_sigma_s = kAllOwn_s;
-  return Telemetry(noise, options_.telemetry_limits);
-}
-
-// During a stall a poll, or its answer, waits for long. Nobody knows when in that time the answer
-// was true; nor how fast the head turned, if it is one of the first two samples, which give the
-// rate.
-bool OrientationStep::is_stalled_poll(const PanTiltSample& sample) {
-  const double width_s = sample.latest_time_s - sample.earliest_time_s;
-  const std::optional<double> newest_s = telemetry_.newest_time();
-  const bool begins =
-      telemetry_.size() < 2 ||
-      sample.latest_time_s > newest_s.value_or(0) + options_.telemetry_limits.max_gap_s;
-  const double longest_s = begins ? 0.02 : 0.1;  // no stall is shorter
-  constexpr double kTimesTheUsual = 2.5;
-  constexpr double kGrowth = 1.5;  // of the usual time, per poll: a device may be or become slow
-  const bool stalled = width_s > std::max(longest_s, kTimesTheUsual * usual_poll_s_);
-  usual_poll_s_ = width_s < usual_poll_s_ ? usual_poll_s_ + (width_s - usual_poll_s_) / 4
-                                          : std::min(width_s, kGrowth * usual_poll_s_);
-  return stalled;
-}
-
 void OrientationStep::add_telemetry(const PanTiltSample& sample) {
-  const std::optional<ClockEstimate> clock = telemetry_clock_.update(
-      sample.latest_time_s, sample.device_time_s, sample.sequence, sample.restarted);
-  const bool filtered = clock.has_value();
-  if (sample.restarted || filtered != telemetry_filtered_ || (clock && clock->restarted)) {
-    telemetry_ = empty_telemetry(filtered);
-    telemetry_filtered_ = filtered;
-    if (oe_) oe_->forget_pending();
-  }
-  telemetry_lost_ = false;
+  const TelemetryIntake::Taken taken = telemetry_.add(sample);
+  if (taken.restarted && oe_) oe_->forget_pending();
   const bool has_zoom = sample.zoom && std::isfinite(*sample.zoom);
   if (has_zoom && zoom_.take(sample.latest_time_s, *sample.zoom)) note_curve_here();
-
-  TelemetrySample timed;
-  timed.pan = sample.pan_rad;
-  timed.tilt = sample.tilt_rad;
-  const double width_s = sample.latest_time_s - sample.earliest_time_s;
-  const bool line_holds = clock && clock->state == ClockState::kLocked;
-  if (options_.wait_for_pace && is_stalled_poll(sample) && !line_holds) return;
-  if (clock) {
-    timed.time_s = clock->time_s;
-    timed.time_sigma_s = clock->sigma_s;
-  } else {
-    timed.time_s = sample.latest_time_s - width_s / 2;
-    timed.time_sigma_s = width_s > 0 ? width_s / std::sqrt(12.0) : options_.telemetry_stamp_sigma_s;
-  }
-  if (has_zoom) zoom_.place(timed.time_s);
-  // The buffer counts what it refuses (a duplicate, a value that is not finite), and the records'
-  // sigma shows the effect.
-  static_cast<void>(telemetry_.push(timed));
+  if (!taken.time_s) return;
+  if (has_zoom) zoom_.place(*taken.time_s);
   settle_pending_frames();
 }
 
@@ -148,15 +101,15 @@ void OrientationStep::settle_pending_frames() {
   }
 }
 
-void OrientationStep::telemetry_lost() { telemetry_lost_ = true; }
+void OrientationStep::telemetry_lost() { telemetry_.note_lost(); }
 
 // True if the new calibration is of the same curve, with the same shared parameters, at a zoom to
 // which OE mode has followed the lens. A map that has only begun there is worth less than what was
 // seen from there before.
 bool OrientationStep::keeps_map(const PublishedCalibration& published) const {
-  if (!oe_ || !options_.calibrated || !published.calibrated || !oe_->lens_has_moved()) return false;
+  if (!oe_ || !now_.calibrated || !published.calibrated || !oe_->lens_has_moved()) return false;
   if (!oe_->has_followed_lens() && !published.map.landmarks.empty()) return false;
-  const Calibration& now = options_.calibration;
+  const Calibration& now = now_.calibration;
   const Calibration& next = published.calibration;
   Calibration by_curve;
   return oe_->statistics().status == OeStatus::kOk && next.zoom &&
@@ -171,19 +124,19 @@ bool OrientationStep::keeps_map(const PublishedCalibration& published) const {
 
 void OrientationStep::adopt(const PublishedCalibration& published) {
   const bool keep = keeps_map(published);
-  options_.calibration = published.calibration;
-  options_.calibrated = published.calibrated;
+  now_.calibration = published.calibration;
+  now_.calibrated = published.calibrated;
+  now_.zoom_curve = published.zoom_curve;
   zoom_.note_adoption();
   minimum_delay_sigma_s_ = 0;
-  options_.zoom_curve = published.zoom_curve;
   note_curve_here();
   if (oe_ && !keep) oe_->reset(published.calibration, published.map, focal_length());
 }
 
 OrientationRecord OrientationStep::empty_record() const {
   OrientationRecord record;
-  record.calibrated = options_.calibrated && zoom_fits();
-  record.camera = pack(options_.calibration);
+  record.calibrated = now_.calibrated && zoom_fits();
+  record.camera = pack(now_.calibration);
   record.zoom = zoom_.told();
   return record;
 }
@@ -205,7 +158,7 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
   events->stamps_left_out = frame_time.stamp_rate_error;
   events->stamps_count = frame_time.stamps_count;
   if (clock.restarted || clock.delay_stepped)
-    minimum_delay_sigma_s_ = std::hypot(options_.minimum_delay_sigma_s, frame_time.moved_s);
+    minimum_delay_sigma_s_ = std::hypot(connections_sigma_s_, frame_time.moved_s);
   answered_by_oe_ = false;
   image_ = image;
   tracks_.stamp = stamp;
@@ -229,7 +182,7 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
     return record;
   }
   record.time_s = clock.time_s;
-  const Calibration& calibration = options_.calibration;
+  const Calibration& calibration = now_.calibration;
   const double to_middle_row_s = calibration.line_delay * (0.5 * calibration.camera.height);
   InterpolatedPanTilt measured;
   const double telemetry_time_s = clock.time_s + calibration.clock_offset + to_middle_row_s;
@@ -248,7 +201,7 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
     time_sigma_s = std::hypot(time_sigma_s, repeated_images_.sigma_s());
     query = telemetry_.query(telemetry_time_s, time_sigma_s, &measured);
   }
-  if (!options_.has_telemetry) {
+  if (!has_telemetry_) {
     record.time_sigma_s = time_sigma_s;
     record.clock_locked = clock.state == ClockState::kLocked;
     orient_by_scene(image, &record);
@@ -259,16 +212,16 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
     record.telemetry_age_s = telemetry_time_s - *newest_s;
   record.time_sigma_s = time_sigma_s;
   record.clock_locked = clock.state == ClockState::kLocked;
-  record.status = status_of_telemetry(query, telemetry_lost_, record.clock_locked);
+  record.status = status_of_telemetry(query, telemetry_.is_lost(), record.clock_locked);
   tracks_.telemetry_too_old = record.status == RecordStatus::kTelemetryTooOld;
   const bool elsewhere = !zoom_fits() || zoom_moved(telemetry_time_s);
   // A map begun at another zoom has lost all its landmarks: the present zoom's calibration is used
   // again.
-  if (!elsewhere && oe_ && options_.calibrated && oe_->lens_has_moved() && oe_->map().size() == 0)
-    oe_->reset(options_.calibration, focal_length());
+  if (!elsewhere && oe_ && now_.calibrated && oe_->lens_has_moved() && oe_->map().size() == 0)
+    oe_->reset(now_.calibration, focal_length());
   if (elsewhere || (oe_ && oe_->lens_has_moved())) {
     FrameLens lens;
-    if (follows_lens() && lens_.look_up(options_.zoom_curve, zoom_, readout_s(), &lens)) {
+    if (follows_lens() && lens_.look_up(now_.zoom_curve, zoom_, readout_s(), &lens)) {
       record.calibrated = true;
       record.camera = pack(lens.calibration);
       const bool excluded = lens_.belief() == ReadingBelief::kExcluded;
@@ -291,7 +244,7 @@ void OrientationStep::orient_between(const InterpolatedPanTilt* measured, double
                                      OrientationRecord* record) {
   Calibration between;
   // Lens and axes of another zoom cannot be used here.
-  if (!zoom_.calibration(options_.zoom_curve, telemetry_time_s, readout_s(), &between)) {
+  if (!zoom_.calibration(now_.zoom_curve, telemetry_time_s, readout_s(), &between)) {
     record->status = RecordStatus::kOtherZoom;
     return;
   }
@@ -322,7 +275,7 @@ void OrientationStep::orient(const InterpolatedPanTilt* measured, const ImageVie
     if (measured != nullptr && status != OeStatus::kOk)
       record->status = status_of_landmarks(status);
   } else if (measured != nullptr &&
-             pt_orientation(options_.calibration, *record->time_s, *measured, &frame) && oe_ &&
+             pt_orientation(now_.calibration, *record->time_s, *measured, &frame) && oe_ &&
              !oe_->put_into_base(&frame)) {
     // If this fails, the frame has no orientation.
     frame = FrameOrientation();

@@ -22,8 +22,6 @@
 #include "core/realtime/oe_mode/oe_mode.h"
 #include "core/realtime/pt_mode.h"
 #include "core/realtime/start_up/start_up_tracker.h"
-#include "core/realtime/telemetry/telemetry_buffer.h"
-#include "edge_app/clocks/capture_clock.h"
 #include "edge_app/clocks/frame_clock.h"
 #include "edge_app/record/orientation_record.h"
 #include "edge_app/record/published_calibration.h"
@@ -31,6 +29,7 @@
 #include "edge_app/step/frame_landmarks.h"
 #include "edge_app/step/repeated_images.h"
 #include "edge_app/step/scene_start.h"
+#include "edge_app/step/telemetry_intake.h"
 #include "edge_app/step/told_base.h"
 #include "platform/pan_tilt/pan_tilt_source.h"
 #include "platform/video/frame_source.h"
@@ -107,7 +106,7 @@ class OrientationStep {
   void maintain();
   // In OE mode, with the present calibration and zoom.
   [[nodiscard]] bool finds_landmarks() const {
-    return oe_ && options_.calibrated && (zoom_fits() || follows_lens());
+    return oe_ && now_.calibrated && (zoom_fits() || follows_lens());
   }
   // In OE mode, or while points are followed.
   [[nodiscard]] bool looks_at_images() const { return finds_landmarks() || start_up_; }
@@ -131,10 +130,13 @@ class OrientationStep {
   [[nodiscard]] OrientationRecord video_lost(double now_s) const;
 
  private:
-  static constexpr std::size_t kSamplesKept = 1024;
-  using Telemetry = TelemetryBuffer<kSamplesKept>;
+  // What is in use, until adopt().
+  struct InUse {
+    Calibration calibration;
+    bool calibrated = false;
+    ZoomCurve zoom_curve;
+  };
 
-  [[nodiscard]] Telemetry empty_telemetry(bool filtered) const;
   [[nodiscard]] OrientationRecord empty_record() const;
   // Learnt if there is a zoom curve, else calibrated.
   [[nodiscard]] FocalLength focal_length() const;
@@ -146,7 +148,7 @@ class OrientationStep {
   // OE mode has a map that it has followed to this zoom or can follow there, or it can begin one
   // from the zoom curve.
   [[nodiscard]] bool follows_lens() const {
-    return oe_ && options_.calibrated && zoom_on_curve_ && (begins_here_ || oe_->map().size() > 0);
+    return oe_ && now_.calibrated && zoom_on_curve_ && (begins_here_ || oe_->map().size() > 0);
   }
   // Sets zoom_on_curve_ and begins_here_ for the present zoom.
   void note_curve_here();
@@ -154,7 +156,6 @@ class OrientationStep {
   [[nodiscard]] bool keeps_map(const PublishedCalibration& published) const;
   // Fills record->localized if the scene map has tied the base.
   void note_tie(OrientationRecord* record) const;
-  [[nodiscard]] bool is_stalled_poll(const PanTiltSample& sample);
   // Passes telemetry to OE mode for frames that were answered by extrapolation, once samples
   // enclose them.
   void settle_pending_frames();
@@ -171,23 +172,25 @@ class OrientationStep {
   // not on the zoom curve.
   [[nodiscard]] bool take_scene_lens(const ToldBase& told);
 
-  OrientationStepOptions options_;
-  FrameClock video_clock_;
-  CaptureClock telemetry_clock_;
-  Telemetry telemetry_;
-  std::unique_ptr<OeMode> oe_;                // null: PT mode
-  std::unique_ptr<StartUpTracker> start_up_;  // null: nobody needs its points
   // PT mode's record by the zoom curve. measured null: the status already says why there is no
   // angle.
   void orient_between(const InterpolatedPanTilt* measured, double telemetry_time_s,
                       OrientationRecord* record);
-
   // s, from a frame's first row to its last.
   [[nodiscard]] double readout_s() const;
   // For a lens taken to stand still: adds to its focal length's variance what a beginning movement
   // may have changed.
   void allow_for_begun_movement(Calibration* calibration) const;
 
+  // As given.
+  bool has_telemetry_;
+  bool follow_points_;
+  double connections_sigma_s_;  // s: how much the least delays of two connections differ
+  FrameClock video_clock_;
+  InUse now_;
+  TelemetryIntake telemetry_;
+  std::unique_ptr<OeMode> oe_;                // null: PT mode
+  std::unique_ptr<StartUpTracker> start_up_;  // null: nobody needs its points
   ZoomReadings zoom_;
   ReadLens lens_;
   bool zoom_on_curve_ = false;  // the present zoom lies on the zoom curve
@@ -196,17 +199,14 @@ class OrientationStep {
   // s: the part of a frame's time error that neighbouring frames share.
   double lasting_sigma_s_ = 0;
   RepeatedImages repeated_images_;
-  SceneStart scene_start_;           // without telemetry
-  Calibration scene_lens_;           // likewise: the lens through which points are followed
-  bool is_beginning_ = false;        // OE mode's map is begun by it
-  double beginning_since_s_ = 0;     // s, frame time
-  bool answered_by_oe_ = false;      // the frame added last, in whatever mode
-  double tied_time_s_ = 0;           // s, of the frame that tied the base
-  ImageView image_;                  // of the frame added last, until maintain()
-  FrameTracks tracks_;               // of the frame added last, without its points
-  bool telemetry_filtered_ = false;  // the times in telemetry_ come from telemetry_clock_
-  bool telemetry_lost_ = false;
-  double usual_poll_s_ = 0.01;  // s, from a poll to its answer
+  SceneStart scene_start_;        // without telemetry
+  Calibration scene_lens_;        // likewise: the lens through which points are followed
+  bool is_beginning_ = false;     // OE mode's map is begun by it
+  double beginning_since_s_ = 0;  // s, frame time
+  bool answered_by_oe_ = false;   // the frame added last, in whatever mode
+  double tied_time_s_ = 0;        // s, of the frame that tied the base
+  ImageView image_;               // of the frame added last, until maintain()
+  FrameTracks tracks_;            // of the frame added last, without its points
 };
 
 }  // namespace alidade

@@ -13,7 +13,7 @@ namespace alidade {
 bool OrientationStep::ask_about_base() { return answered_by_oe_ && oe_->ask_about_base(); }
 
 bool OrientationStep::ask_where_it_looks(Vector3<double>* angular_velocity) {
-  return !options_.has_telemetry && !answered_by_oe_ && !scene_start_.is_known() &&
+  return !has_telemetry_ && !answered_by_oe_ && !scene_start_.is_known() &&
          scene_start_.ask(tracks_.stamp.frame, angular_velocity);
 }
 
@@ -34,7 +34,7 @@ void OrientationStep::settle_base(const ToldBase& told) {
 bool OrientationStep::take_scene_lens(const ToldBase& told) {
   if (focal_length() == FocalLength::kCalibrated) return true;
   FrameLens lens;
-  if (!lens_of_focal_length(options_.zoom_curve, std::exp(told.log_f), &lens)) return false;
+  if (!lens_of_focal_length(now_.zoom_curve, std::exp(told.log_f), &lens)) return false;
   const double change = told.log_f - std::log(scene_lens_.camera.focal_length);
   const double sigma =
       std::hypot(relative_focal_length_sigma(scene_lens_), std::sqrt(told.log_f_variance));
@@ -69,7 +69,7 @@ void OrientationStep::orient_by_scene(const ImageView& image, OrientationRecord*
   FrameOrientation frame;
   FrameLens lens;
   constexpr double kStands = 0.02;  // 1/s, of log f: less is its noise
-  const bool has_lens = oe_->lens_has_moved() && lens_.as_found(options_.zoom_curve, &lens);
+  const bool has_lens = oe_->lens_has_moved() && lens_.as_found(now_.zoom_curve, &lens);
   if (has_lens) lens.moves = std::abs(lens_.found_rate()) > kStands;
   if (!is_beginning_ && oe_->process(image, *record->time_s, nullptr, has_lens ? &lens : nullptr,
                                      &frame) == OeStatus::kOk) {

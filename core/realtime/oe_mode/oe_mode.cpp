@@ -156,7 +156,7 @@ OeMode::Solution OeMode::solve_about(const FrameMotion<double>& motion,
   out.motion = motion;
   const Camera<double>& camera = calibration_.camera;
   out.camera = camera;
-  out.status = solve_orientation(search_.found().data(), fine.found, prior, SolveLimits{},
+  out.status = solve_orientation(search_.found().data(), fine.found, prior, options_.solve,
                                  camera.width, camera.height,
                                  calibration_.line_delay * (0.5 * camera.height), &out.solved);
   return out;
@@ -174,10 +174,9 @@ OeMode::Solution OeMode::find_and_solve(const PredictedMotion& predicted,
   const bool doubtful = first.status == SolveStatus::kTooFew ||
                         (first.status == SolveStatus::kOk &&
                          first.solved.inliers < look.least_held * statistics_.chosen);
-  // A lens that moves unnoticed shows in the residuals first. All may still be inliers.
-  constexpr double kMisfit = 6;  // times the covariance claimed
+  // A lens that moves unnoticed shows in the residuals first.
   const bool misfit = lens_is_learnt() && !lens_.moves() && first.status == SolveStatus::kOk &&
-                      first.solved.inflation > kMisfit;
+                      first.solved.inflation > look.misfit;
   if (!doubtful && !misfit) return first;
   if (lens_is_learnt() && map_.size() > 0) return look_for_moved_lens(first, coarse, predicted);
   if (!prediction_.follows(frame_.time_s)) return first;

@@ -103,8 +103,8 @@ class OeMode {
   // their size. The map stays; it begins with a lens at rest.
   // lens: what is known of it; null: nothing new. If it is missing or wrong, the previous frames
   // and the image determine f as far as they can. Distortion and centre come from `lens`, along its
-  // curve to the image's f. If its focal length is excluded (reading_sigmas), the caller passes the
-  // curve's at the f that was found.
+  // curve to the image's f. If the reading is not believed, the caller passes the curve's lens at
+  // the f that was found: read_lens.h does so.
   [[nodiscard]] OeStatus process(const ImageView& image, double frame_time_s,
                                  const InterpolatedPanTilt* at_middle_row, const FrameLens* lens,
                                  FrameOrientation* out);

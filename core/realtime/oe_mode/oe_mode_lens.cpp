@@ -75,13 +75,13 @@ void OeMode::set_camera(const Camera<double>& camera) {
 // another lens's.
 OeMode::Solution OeMode::look_with_own_lens(FrameMotion<double> motion,
                                             const PredictedMotion& predicted) {
-  constexpr double kFar_px = 0.5;  // in the corners
   motion.zoom_rate = lens_.expected().value[1];
   Solution out = solve_about(motion, predicted);
   if (out.status != SolveStatus::kOk) return out;
   const SolvedMotion& solved = out.solved;
   const double diagonal_px = std::hypot(calibration_.camera.width, calibration_.camera.height);
-  if (!(std::abs(solved.zoom.correction[0]) * diagonal_px > 2 * kFar_px)) return out;
+  if (!(std::abs(solved.zoom.correction[0]) * diagonal_px > 2 * options_.look.other_lens_px))
+    return out;
   add(solved.correction, &motion);
   motion.zoom_rate += solved.zoom.correction[1];
   const double log_f = std::log(calibration_.camera.focal_length) + solved.zoom.correction[0];
@@ -96,14 +96,12 @@ OeMode::Solution OeMode::look_for_moved_lens(const Solution& first,
   const LookOptions& look = options_.look;
   const OeStatistics first_look = statistics_;
   const bool follows = prediction_.follows(frame_.time_s);
-  // Required factor of improvement on the first look, if that held.
-  constexpr double kBetter = 0.5;
   const bool few = first.status != SolveStatus::kOk ||
                    first.solved.inliers < look.least_held * statistics_.chosen;
   const auto holds = [&](const Solution& s) {
     return s.status == SolveStatus::kOk && s.solved.inliers >= look.least_held_again &&
            s.solved.inliers >= look.least_held * statistics_.chosen &&
-           (few || s.solved.inflation < kBetter * first.solved.inflation);
+           (few || s.solved.inflation < look.better * first.solved.inflation);
   };
   const FrameMotion<double> carried =
       follows ? prediction_.last_carried_on(frame_.time_s) : coarse.motion;

@@ -175,11 +175,11 @@ void OeMode::straighten_map() {
 // Once it shows in the image, puts what is known of the lens into the calibration, and moves all
 // that came with it.
 void OeMode::follow_lens() {
-  constexpr double kShows_px = 0.1;  // in the image's corners; below it the linear problem has it
   const LensScale& lens = offset_.lens();
   const Camera<double>& camera = calibration_.camera;
   const double phi = lens.value;
-  if (!(std::abs(phi) * std::hypot(camera.width, camera.height) > 2 * kShows_px)) return;
+  if (!(std::abs(phi) * std::hypot(camera.width, camera.height) > 2 * options_.look.shown_lens_px))
+    return;
   for (int slot = 0; slot < map_.capacity(); ++slot) {
     if (!map_.occupied(slot)) continue;
     const Landmark& landmark = map_.at(slot);

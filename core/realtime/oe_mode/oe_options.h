@@ -11,6 +11,7 @@
 #include "core/realtime/oe_mode/map_upkeep.h"
 #include "core/realtime/oe_mode/motion_prediction.h"
 #include "core/realtime/oe_mode/octaves.h"
+#include "core/realtime/oe_mode/orientation_solve.h"
 
 namespace alidade {
 
@@ -28,6 +29,18 @@ struct LookOptions {
   // also the number of visible ones that must be left when a handed-over map is doubted.
   int few = 10;
   int few_coarse = 5;
+  // Only with a learnt focal length:
+  // Factor of the landmarks' covariances, > 1. Beyond it the lens may have moved unnoticed, though
+  // all landmarks may still be inliers.
+  double misfit = 6;
+  // 0 to 1; a lens found by another look holds only if it has less than this share of that factor.
+  double better = 0.5;
+  // px, in the image's corners, > 0; a lens found farther from the expected one is looked through
+  // again.
+  double other_lens_px = 0.5;
+  // px, in the image's corners, > 0; from there on a change of the map's lens is put into the
+  // calibration. Below it the linear problem has it.
+  double shown_lens_px = 0.1;
 
   // False if a value is invalid. *error, if not null, then says which in one line.
   [[nodiscard]] bool validate(const char** error = nullptr) const;
@@ -42,6 +55,7 @@ struct OeOptions {
   MotionPredictionOptions prediction;
   LandmarkSearchOptions search;
   LookOptions look;
+  SolveLimits solve;
   MapOffsetOptions offset;
   BaseTieOptions tie;
   LensFollowerOptions lens;

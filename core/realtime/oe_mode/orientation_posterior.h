@@ -1,7 +1,7 @@
 #pragma once
 // The last step of a frame's solution: all that is known together. Unknowns: the motion x, the
-// map's offset g and, if it is learnt, phi with the frame's own lens. Times are in units of half the
-// read-out. Internal to orientation_solve.cpp. No allocation.
+// map's offset g and, if it is learnt, phi with the frame's own lens. Times are in units of half
+// the read-out. Internal to orientation_solve.cpp. No allocation.
 
 #include "core/realtime/oe_mode/orientation_without_angles.h"
 
@@ -41,7 +41,7 @@ struct Posterior {
   Sensitivity<8> sensitivity = Sensitivity<8>::Zero();
 };
 
-// inlier: of each landmark, by gate().
+// weights, and the landmarks' `inlier`: by gate(). *shared: rad^2, the landmarks' common error.
 [[nodiscard]] FromLandmarks sums_of_landmarks(const Given& given, const FoundLandmark* landmarks,
                                               const double* weights, double inflation,
                                               Matrix2<double>* shared);

@@ -36,6 +36,18 @@ bool conclude(const internal::Given& given, const internal::Posterior& posterior
 
 }  // namespace
 
+bool SolveLimits::validate(const char** error) const {
+  const char* problem = nullptr;
+  if (!(min_half_readout_s > 0)) problem = "min_half_readout_s must be positive";
+  if (!(max_scale >= 1)) problem = "max_scale must be at least 1";
+  if (!(max_contradiction > 0)) problem = "max_contradiction must be positive";
+  if (!(min_inlier_share >= 0 && min_inlier_share <= 1))
+    problem = "min_inlier_share must be 0 to 1";
+  if (min_inliers < 1) problem = "min_inliers must be at least 1";
+  if (error != nullptr && problem != nullptr) *error = problem;
+  return problem == nullptr;
+}
+
 SolveStatus solve_orientation(FoundLandmark* landmarks, int count, const MotionPrior& prior,
                               const SolveLimits& limits, double width, double height,
                               double half_readout_s, SolvedMotion* out) {

@@ -105,11 +105,15 @@ struct SolvedMotion {
 };
 
 struct SolveLimits {
-  int min_inliers = 8;
-  double min_inlier_share = 0.3;
-  double max_contradiction = kMaxContradiction;  // chi-square
-  double max_scale = 30;  // largest factor of residuals over their standard deviation
-  double min_half_readout_s = 1e-3;
+  int min_inliers = 8;            // >= 1; with fewer there is no solution
+  double min_inlier_share = 0.3;  // 0 to 1, of the found landmarks
+  // Chi-square, 2 degrees of freedom, > 0; beyond it landmarks and telemetry exclude each other.
+  double max_contradiction = kMaxContradiction;
+  double max_scale = 30;  // >= 1; largest factor of residuals over their standard deviation
+  double min_half_readout_s = 1e-3;  // s, > 0; least unit of time, for a lens without read-out
+
+  // False if a value is invalid. *error, if not null, then says which in one line.
+  [[nodiscard]] bool validate(const char** error = nullptr) const;
 };
 
 // width, height: px, of the image. half_readout_s: scale of the rows' times.

@@ -1,0 +1,66 @@
+#include "edge_app/step/telemetry_intake.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace alidade {
+
+TelemetryIntake::Samples TelemetryIntake::empty(bool filtered) const {
+  // Filtered times share the error of their line. Polled times have an error each, which a bound
+  // beyond every stamp's sigma expresses.
+  constexpr double kAllOwn_s = 1e3;
+  TelemetryNoise noise = options_.noise;
+  if (!filtered) noise.period_sigma_s = kAllOwn_s;
+  return Samples(noise, options_.limits);
+}
+
+// During a stall a poll, or its answer, waits for long. Nobody knows when in that time the answer
+// was true; nor how fast the head turned, if it is one of the first two samples, which give the
+// rate.
+bool TelemetryIntake::is_stalled_poll(const PanTiltSample& sample) {
+  const double width_s = sample.latest_time_s - sample.earliest_time_s;
+  const std::optional<double> newest_s = samples_.newest_time();
+  const bool begins = samples_.size() < 2 ||
+                      sample.latest_time_s > newest_s.value_or(0) + options_.limits.max_gap_s;
+  const double longest_s = begins ? 0.02 : 0.1;  // no stall is shorter
+  constexpr double kTimesTheUsual = 2.5;
+  constexpr double kGrowth = 1.5;  // of the usual time, per poll: a device may be or become slow
+  const bool stalled = width_s > std::max(longest_s, kTimesTheUsual * usual_poll_s_);
+  usual_poll_s_ = width_s < usual_poll_s_ ? usual_poll_s_ + (width_s - usual_poll_s_) / 4
+                                          : std::min(width_s, kGrowth * usual_poll_s_);
+  return stalled;
+}
+
+TelemetryIntake::Taken TelemetryIntake::add(const PanTiltSample& sample) {
+  Taken out;
+  const std::optional<ClockEstimate> clock =
+      clock_.update(sample.latest_time_s, sample.device_time_s, sample.sequence, sample.restarted);
+  const bool filtered = clock.has_value();
+  out.restarted = sample.restarted || filtered != filtered_ || (clock && clock->restarted);
+  if (out.restarted) {
+    samples_ = empty(filtered);
+    filtered_ = filtered;
+  }
+  is_lost_ = false;
+
+  TelemetrySample timed;
+  timed.pan = sample.pan_rad;
+  timed.tilt = sample.tilt_rad;
+  const double width_s = sample.latest_time_s - sample.earliest_time_s;
+  const bool line_holds = clock && clock->state == ClockState::kLocked;
+  if (options_.leave_out_stalled && is_stalled_poll(sample) && !line_holds) return out;
+  if (clock) {
+    timed.time_s = clock->time_s;
+    timed.time_sigma_s = clock->sigma_s;
+  } else {
+    timed.time_s = sample.latest_time_s - width_s / 2;
+    timed.time_sigma_s = width_s > 0 ? width_s / std::sqrt(12.0) : options_.stamp_sigma_s;
+  }
+  // The buffer counts what it refuses (a duplicate, a value that is not finite), and the records'
+  // sigma shows the effect.
+  static_cast<void>(samples_.push(timed));
+  out.time_s = timed.time_s;
+  return out;
+}
+
+}  // namespace alidade
