@@ -244,12 +244,12 @@ void RtpSource::count(const RtpConnection& connection) {
   const std::string of = options_.url + ": ";
   if (now.foreign_packets > counted_.foreign_packets) {
     remarks_.say(kForeignPackets, of + "packets of " + connection.foreign_kind() +
-                                      " come among the video's; the session has not agreed upon "
-                                      "them: they are counted and left out");
+                                      " come between those of the video; the session did not "
+                                      "announce them, so they are counted and left out");
   }
   if (now.garbage_bytes > counted_.garbage_bytes) {
-    remarks_.say(kGarbage, of + "bytes come that belong to no packet; they are counted and passed "
-                                "over: a fault of the camera, or of a relay in between");
+    remarks_.say(kGarbage, of + "bytes come that belong to no packet; they are counted and "
+                                "skipped: a fault of the camera, or of a relay in between");
   }
   if (now.unstamped > counted_.unstamped) {
     remarks_.say(kBadStamp, of + bad_stamp_remark(connection.bad_stamp_off_s()));
