@@ -72,17 +72,17 @@ std::vector<std::string> CalibrationExclusions::describe() const {
   const auto add = [&lines](int count, const char* what) {
     if (count > 0) lines.push_back(std::to_string(count) + " " + what);
   };
-  add(frames_not_finite, "frames whose stamp is no number");
-  add(frames_duplicate, "frames named before");
+  add(frames_not_finite, "frames whose stamp is not a number");
+  add(frames_duplicate, "frames that are given twice");
   add(frames_without_telemetry, "frames outside the telemetry's time span");
-  add(observations_not_finite, "observations that are no numbers");
+  add(observations_not_finite, "observations that are not numbers");
   add(observations_bad_sigma, "observations whose sigma is not positive");
   add(observations_outside_image, "observations outside the image");
   add(observations_duplicate, "observations of a landmark seen twice in one frame");
   add(observations_unknown_frame, "observations in frames without a stamp");
   add(observations_of_single_landmarks, "observations of landmarks seen only once");
   add(observations_outliers, "observations that are outliers");
-  add(telemetry_not_finite, "telemetry samples that are no numbers");
+  add(telemetry_not_finite, "telemetry samples that are not numbers");
   add(telemetry_duplicate, "telemetry samples that repeat a sequence number or stamp");
   add(telemetry_outliers, "telemetry samples that are outliers");
   add(telemetry_unused, "telemetry samples before or after the video");

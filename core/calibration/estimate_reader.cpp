@@ -36,7 +36,7 @@ void EstimateReader::check_keys(const YAML::Node& map, const std::vector<std::st
     case KeyFault::kNoWord:
       fail(found->key, "a key is not a word; write `name: value`");
     case KeyFault::kDoubled:
-      fail(found->key, prefix + found->key.Scalar() + " stands here a second time; keep one");
+      fail(found->key, prefix + found->key.Scalar() + " is given twice; keep one");
     case KeyFault::kUnknown:
       fail(found->key,
            "unknown key " + prefix + found->key.Scalar() + "; known are " + join(known));
@@ -142,11 +142,11 @@ void EstimateReader::read_covariance(const YAML::Node& entry, const EstimateRows
     const std::string& name = rows.names[static_cast<std::size_t>(i)];
     if (covariance(i, i) < 0) {
       fail(matrix, "covariance.matrix has the negative variance " + short_text(covariance(i, i)) +
-                       " of " + name + "; 0 stands for exact");
+                       " of " + name + "; 0 means exact");
     }
     const double sigma = std::sqrt(covariance(i, i));
     if (sigma > rows.largest_sigma[static_cast<std::size_t>(i)]) {
-      fail(matrix, "covariance.matrix says that sigma of " + name + " is " + short_text(sigma) +
+      fail(matrix, "by covariance.matrix the sigma of " + name + " is " + short_text(sigma) +
                        "; the square of one standard deviation, in " + rows.unit + ", is needed");
     }
   }
@@ -182,7 +182,7 @@ void EstimateReader::check_sigma(const YAML::Node& node, const std::string& name
                                  double variance) const {
   const double expected = std::sqrt(variance);
   if (std::abs(sigma - expected) <= 1e-3 * expected) return;
-  fail(node, "sigma of " + name + " is " + short_text(sigma) + ", its covariance says " +
+  fail(node, "sigma of " + name + " is " + short_text(sigma) + ", but by its covariance it is " +
                  short_text(expected) + "; make them agree, or leave one out");
 }
 

@@ -115,7 +115,7 @@ class KnownCameraTrial {
                                        parameter_sigma(alone, Parameter::kFocalLength), 1, "px");
     if (f.sigmas > kMostSigmas) {
       say(f.relative > kAnotherZoom
-              ? "found at another zoom, focal length and distortion do not count here: " + f.text
+              ? "focal length and distortion were found at another zoom and are not used: " + f.text
               : "focal length contradicts the recording and is left out, with the distortion: " +
                     f.text + "; is the lens focused as it was then, and at the same zoom?");
       return;
@@ -137,8 +137,8 @@ class KnownCameraTrial {
     if (known_.line_delay.wanted) done_.options.line_delay = known_.line_delay.prior;
     if (known_.aspect.wanted) done_.options.aspect = known_.aspect.prior;
     if (known_.line_delay.wanted || known_.aspect.wanted) {
-      say("the recording alone gives no calibration to hold it against; line delay and aspect are "
-          "taken on trust, focal length and distortion are not");
+      say("the recording alone gives no calibration to compare with, so line delay and aspect are "
+          "used unchecked, and focal length and distortion are not used");
     }
   }
 

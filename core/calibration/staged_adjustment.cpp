@@ -60,16 +60,16 @@ StageStatus StagedAdjustment::adjust_on_inliers(CalibrationQuality* quality) {
     if (!converged) break;
     if (!adjustment_.covariance(adjusted_.at, &adjusted_.covariance, &telemetry_unknowns_)) {
       return {CalibrationStatus::kWeak,
-              "the data leave a combination of parameters open: move both axes, at changing speed, "
-              "over a good part of the image"};
+              "the data do not determine all parameters: move both axes, at changing speed, over a "
+              "good part of the image"};
     }
     if (!correct_noise(quality)) break;
   }
   quality->steps = adjustment_.steps_taken();
   if (!converged) {
     return {CalibrationStatus::kNotConverged,
-            "the adjustment does not converge: the model does not describe these data; are the "
-            "image's size and the tracks those of one zoom?" +
+            "the adjustment does not converge: the model does not describe these data; is the "
+            "image's size right, and are all tracks from one zoom?" +
                 doubt_};
   }
   const StageStatus status = allow_for_repetition(quality);

@@ -48,7 +48,8 @@ std::string moved_little(int axis, double range, double f, int width) {
 }
 
 std::string reversed_text(const ReversedAxes& reversed) {
-  constexpr const char* kHow = ": the image moves the other way than the telemetry's angles say; ";
+  constexpr const char* kHow =
+      ": the image moves in the opposite direction to the telemetry's angles; ";
   if (reversed.pan && reversed.tilt) {
     return std::string("pan and tilt are both reversed") + kHow +
            "pan right and tilt up must be positive, or is the image upside down?";
@@ -83,10 +84,10 @@ CalibrationStatus check_axes(const Calibration& c, const MotionExtent& motion, s
     if (is_there && turn <= kMaxAxisTurn) continue;
     const bool is_little = range_px < kGoodTravelShare * c.camera.width;
     *why = is_little ? moved_little(axis, motion.range[axis], f, c.camera.width)
-                     : std::string(axis_name(axis)) + " does not turn the image as it says";
+                     : std::string(axis_name(axis)) + " does not turn the image as its angles say";
     if (turn > kMaxAxisTurn) {
       *why +=
-          text("; its axis comes out %.0f deg from where it should lie: is ", turn * 180 / kPi) +
+          text("; its axis is estimated %.0f deg from where it should lie: is ", turn * 180 / kPi) +
           (axis == 0 ? "pan right" : "tilt up") + " positive?";
     }
     return is_little ? CalibrationStatus::kOneAxisOnly : CalibrationStatus::kTelemetryMismatch;
@@ -161,8 +162,8 @@ CalibrationStatus check_motion(const std::vector<ImageMotion>& motion,
                                const CalibrationInput& input, std::string* why) {
   if (motion.size() < 3) {
     *why =
-        "hardly two frames share three landmarks over half a second: track landmarks longer, or "
-        "move by less than half a picture in that time";
+        "hardly any two frames half a second apart share three landmarks: track landmarks longer, "
+        "or move by less than half a picture in that time";
     return CalibrationStatus::kTooFewLandmarks;
   }
   double largest_shift = 0;
@@ -189,9 +190,8 @@ CalibrationStatus check_motion(const std::vector<ImageMotion>& motion,
   if (match.correlation > kMinCorrelation &&
       extent.varying_rate.norm() < kMinRateVariation * rate) {
     *why =
-        "pan and tilt move at constant velocity: clock offset and line delay cannot be told from a "
-        "turned "
-        "scene; change speed and direction some times";
+        "pan and tilt move at constant velocity, so clock offset and line delay cannot be told "
+        "from a rotated scene; change speed and direction a few times";
     return CalibrationStatus::kConstantVelocity;
   }
   if (match.apart) {
@@ -239,11 +239,11 @@ void judge(const CalibrationOptions& options, const MotionExtent& motion,
       parameter_sigma(c, Parameter::kPanScale) > 0.5 * options.pan_scale.sigma &&
       std::abs(correlation(Parameter::kFocalLength, Parameter::kPanScale)) > 0.95;
   if (scale_from_prior) {
-    advice.push_back(text(
-        "scales and focal length cannot be told apart in this field of view: the focal length "
-        "is known to %.2g relative to the telemetry's scale, which is believed to %.2g; turning "
-        "a whole circle, or a wider field of view, would separate them",
-        f_error, options.pan_scale.sigma));
+    advice.push_back(
+        text("scales and focal length cannot be told apart in this field of view: relative to the "
+             "telemetry's scale the focal length is known to %.2g, and that scale itself to %.2g; "
+             "a whole turn or a wider field of view would separate them",
+             f_error, options.pan_scale.sigma));
   }
   if (f_error > kMaxFocalLengthError && !scale_from_prior) {
     reasons.push_back(
@@ -273,8 +273,9 @@ void judge(const CalibrationOptions& options, const MotionExtent& motion,
   for (const Parameter p :
        {Parameter::kPanAxis0, Parameter::kPanAxis1, Parameter::kTiltAxis0, Parameter::kTiltAxis1}) {
     if (options.axis_sigma_rad > 0 && parameter_sigma(c, p) > 0.7 * options.axis_sigma_rad) {
-      advice.push_back(std::string(to_string(p)) +
-                       " rests on its prior: a larger range of the other axis would show it");
+      advice.push_back(
+          std::string(to_string(p)) +
+          " is known from its prior only: a larger range of the other axis would determine it");
     }
   }
   result->quality.weak_in_time =

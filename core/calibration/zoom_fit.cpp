@@ -218,8 +218,7 @@ bool fit_zoom(const std::vector<Calibration>& calibrations,
     if (free != places) {
       *error = "the calibrations at " + reading_text(*sorted.front().zoom) + " and " +
                reading_text(*c.zoom) +
-               " do not take the same parameters as exact; make them with "
-               "the same priors";
+               " do not hold the same parameters exact; make them with the same priors";
       return false;
     }
     samples.push_back(sample);
@@ -304,9 +303,9 @@ bool extend_zoom(const ZoomCurve& curve, const Calibration& added, std::optional
   if (free_places(covariance) !=
       internal::no_zoom_evidence({before.reading.begin(), before.reading.begin() + before.nodes})
           .rows(places)) {
-    *error = "the calibration at " + reading_text(sample.reading) +
-             " and the zoom curve do not take the same parameters as exact; make them with the "
-             "same priors";
+    *error =
+        "the calibration at " + reading_text(sample.reading) +
+        " and the zoom curve do not hold the same parameters exact; make them with the same priors";
     return false;
   }
   if (!internal::take_apart(ZoomCurve(before), parts, &evidence)) {

@@ -63,7 +63,7 @@ bool passed_readings(const ZoomMovement& movement, const std::vector<ZoomReading
     passed->push_back(all[i]);
   }
   if (passed->size() >= 4) return true;
-  *error = "fewer than 4 zoom readings were told on the way";
+  *error = "fewer than 4 zoom readings came on the way";
   return false;
 }
 
@@ -199,8 +199,8 @@ bool observe_movement(const ZoomMovement& movement, const ZoomCurve& curve,
   }
   if (!adjustment.run(error)) return false;
   if (adjustment.pixel_sigma_ratio() > kWorstPixelRatio) {
-    *error = "the tracks are " + short_text(adjustment.pixel_sigma_ratio()) +
-             " times as far off as they say";
+    *error =
+        "the tracks are " + short_text(adjustment.pixel_sigma_ratio()) + " times their sigmas off";
     return false;
   }
 

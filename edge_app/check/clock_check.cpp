@@ -166,27 +166,26 @@ void judge_clock(const ClockReport& clock, const std::string& what, Findings* fi
     add_problem(
         findings,
         clock.counts
-            ? fmt::format(
-                  "{}: its time stamps count pictures and tell no time: {:.3g} seconds in each "
-                  "of the host's; arrival times are taken instead: set the camera to a "
-                  "rate that it keeps, or its stamps to its clock",
-                  what, seconds)
-            : fmt::format("{}: the sender's clock counts {:.3g} seconds in each of the host's; its "
-                          "time stamps cannot be used: correct the camera's stream settings",
+            ? fmt::format("{}: its time stamps count pictures, not time ({:.3g} s of stamps in "
+                          "each second of the host), so arrival times are used instead; set a "
+                          "frame rate that the camera keeps, or let it stamp by its clock",
+                          what, seconds)
+            : fmt::format("{}: the sender's clock runs at {:.3g} times the host's, so its time "
+                          "stamps cannot be used; correct the camera's stream settings",
                           what, seconds));
     return;
   }
   if (clock.counters.restarts > 0) {
-    add_problem(findings,
-                fmt::format("{}: the sender's clock jumped {} times; each time the clock "
-                            "filter begins anew: switch off what sets the camera's clock, "
-                            "or let NTP slew it",
-                            what, clock.counters.restarts));
+    add_problem(
+        findings,
+        fmt::format("{}: the sender's clock jumped {} times, and the clock filter began anew each "
+                    "time; switch off what sets the camera's clock, or let NTP slew it",
+                    what, clock.counters.restarts));
   }
   if (clock.counters.delay_steps > 0) {
     add_advice(findings,
-               fmt::format("{}: the least delay changed by {:.1f} ms; that is flagged and not "
-                           "followed: look for a changed route or a buffer that filled up",
+               fmt::format("{}: the shortest delay changed by {:.1f} ms, which is reported but not "
+                           "corrected; look for a changed route or a buffer that filled up",
                            what, 1e3 * clock.delay_shift_s));
   }
 }
@@ -194,12 +193,13 @@ void judge_clock(const ClockReport& clock, const std::string& what, Findings* fi
 std::string why_no_times(const ClockReport& clock) {
   if (clock.usable) return "";
   return clock.counts ? "the camera's time stamps count pictures"
-                      : "the camera's time stamps are no times";
+                      : "the camera's time stamps are not times";
 }
 
 std::string describe(const ClockReport& clock) {
   if (clock.kind == StampKind::kArrival) return "none: each item has the time of its arrival";
-  if (!clock.usable) return "not used: its time stamps are no times; arrival times instead";
+  if (!clock.usable)
+    return "not used: its time stamps are not times; arrival times are used instead";
   std::string text = clock.state == ClockState::kLocked ? "locked" : "warming up";
   text += clock.kind == StampKind::kSender
               ? fmt::format(", rate error {:+.0f} ppm", 1e6 * clock.rate_error)

@@ -138,8 +138,7 @@ ImageReport ImageCheck::report(const ImageNeeds& needs) const {
   if (report.images == 0 && report.without > 0) {
     add_advice(&report.findings,
                "video " + needs.source +
-                   ": no pictures that could be looked at: neither calibration nor "
-                   "OE mode is possible");
+                   ": no picture could be used, so neither calibration nor OE mode is possible");
   } else if (report.points) {
     judge(&report, needs);
   }

@@ -50,8 +50,8 @@ void judge_signs(MotionReport* report, const MotionNeeds& needs) {
   if (report->quarter_turn) {
     add_problem(&report->findings,
                 where +
-                    "pan moves the picture up and down, and tilt to the side: it is turned by a "
-                    "quarter; set the camera's picture upright");
+                    "pan moves the picture up and down, and tilt moves it sideways: it is turned "
+                    "by 90 degrees; set the camera's picture upright");
   } else if (pan && tilt) {
     add_problem(
         &report->findings,
@@ -81,7 +81,7 @@ void judge_scale(MotionReport* report, const MotionNeeds& needs) {
   if (std::abs(factor - 1) <= (needs.calibrated ? kCalibrated : kGuess)) return;
   add_problem(
       &report->findings,
-      fmt::format("{}: the picture moves as with a focal length of {:.0f} px, {:.2f} times the "
+      fmt::format("{}: the picture moves as if the focal length were {:.0f} px, {:.2f} times the "
                   "{:.0f} px given; {}",
                   needs.focal_length_from, *report->focal_length_px, factor, needs.focal_length_px,
                   needs.calibrated ? "has the zoom changed? Calibrate again"
@@ -99,8 +99,8 @@ void judge_offset(MotionReport* report, const MotionNeeds& needs) {
   }
   add_advice(
       &report->findings,
-      fmt::format("{}: its clock offset is {:.0f} ms, but picture and telemetry fit with about "
-                  "{:.0f} ms; another link or codec delays differently: calibrate again",
+      fmt::format("{}: its clock offset is {:.0f} ms, but picture and telemetry fit best at about "
+                  "{:.0f} ms; another link or codec has another delay: calibrate again",
                   needs.focal_length_from, 1e3 * needs.clock_offset_s,
                   1e3 * *report->clock_offset_s));
 }
@@ -112,18 +112,16 @@ void judge_presence(MotionReport* report, double image_px, double head_rad,
   const double head_px = head_rad * needs.focal_length_px;
   if (!(much_px > 0)) return;
   if (head_rad == 0 && image_px > much_px) {
-    add_problem(
-        &report->findings,
-        fmt::format("pan/tilt {}: always the same angles, while the picture moved by {:.0f} px; "
-                    "the device reports no position of this camera: look at its address, "
-                    "camera number and permissions",
-                    needs.source, image_px));
+    add_problem(&report->findings,
+                fmt::format("pan/tilt {}: the angles never change, although the picture moved by "
+                            "{:.0f} px; the device does not report this camera's position: check "
+                            "its address, camera number and permissions",
+                            needs.source, image_px));
   } else if (!report->image_moved && head_px > much_px) {
-    add_problem(
-        &report->findings,
-        fmt::format("video {}: the picture stands still, while the head turned by {:.0f} px; it "
-                    "is frozen, or another camera's",
-                    needs.video, head_px));
+    add_problem(&report->findings,
+                fmt::format("video {}: the picture does not move, although the head turned by "
+                            "{:.0f} px; it is frozen, or comes from another camera",
+                            needs.video, head_px));
   }
 }
 

@@ -55,8 +55,8 @@ RepeatReport check_repeats(const std::vector<CheckedFrame>& frames,
   if (!(share > kFew)) return report;
   report.findings.push_back(
       {share > kMany ? Severity::kProblem : Severity::kAdvice,
-       fmt::format("video {}: {} of {} pictures taken while the head turned are exactly the one "
-                   "before, sent again: {:.1f} new ones a second; run leaves them out; set the "
+       fmt::format("video {}: {} of {} pictures that came while the head turned repeat the one "
+                   "before: {:.1f} new ones come a second. run leaves the repeats out; set the "
                    "camera, its night mode, the converter or the grabber to that rate",
                    needs.video, report.repeated, report.turning, *report.fresh_hz)});
   return report;

@@ -33,24 +33,22 @@ void judge_rate(TelemetryReport* report, const TelemetryNeeds& needs) {
   const double age_s = (report->age_s ? report->age_s->most : 0) + needs.clock_offset_s;
   if (interval_s > needs.max_gap_s) {
     add_problem(&report->findings,
-                fmt::format("{}one sample each {:.2f} s; angles are not told between samples more "
-                            "than {:.1f} s apart: raise pan_tilt.rate_hz",
+                fmt::format("{}one sample every {:.2f} s; between samples more than {:.1f} s apart "
+                            "no angle is given: raise pan_tilt.rate_hz",
                             where, interval_s, needs.max_gap_s));
   } else if (age_s > needs.max_extrapolation_s) {
-    add_problem(
-        &report->findings,
-        fmt::format(
-            "{}the newest angle known is up to {:.0f} ms old (95 %) when a frame asks for it "
-            "(pan_tilt.max_repeat_s, {:.0f} ms, is part of it while the head rests), and "
-            "realtime.max_extrapolation_s is {:.0f} ms: such frames get no angle; "
-            "set it to {:.2f}, or raise pan_tilt.rate_hz",
-            where, 1e3 * age_s, 1e3 * needs.max_repeat_s, 1e3 * needs.max_extrapolation_s,
-            kReserve * age_s + 0.005));
+    add_problem(&report->findings,
+                fmt::format("{}the newest angle is up to {:.0f} ms old (95 %) when a frame needs "
+                            "it (pan_tilt.max_repeat_s, {:.0f} ms, is part of it while the head "
+                            "rests), but realtime.max_extrapolation_s is {:.0f} ms, so such frames "
+                            "get no angle; set it to {:.2f}, or raise pan_tilt.rate_hz",
+                            where, 1e3 * age_s, 1e3 * needs.max_repeat_s,
+                            1e3 * needs.max_extrapolation_s, kReserve * age_s + 0.005));
   } else if (needs.rate_hz && *report->rate_hz < kMuchSlower * *needs.rate_hz) {
     add_advice(
         &report->findings,
-        fmt::format("{}{:.1f} samples a second of the {:.1f} asked for; the device answers "
-                    "after {:.1f} ms: set pan_tilt.rate_hz to what it can do, and look at the link",
+        fmt::format("{}{:.1f} samples a second of the {:.1f} asked for; the device answers after "
+                    "{:.1f} ms: lower pan_tilt.rate_hz to what it can do, and check the link",
                     where, *report->rate_hz, *needs.rate_hz, 1e3 * bounds_s));
   }
 }
@@ -61,13 +59,12 @@ void judge_repeats(TelemetryReport* report, const TelemetryNeeds& needs) {
   constexpr double kReserve = 1.2;
   constexpr double kRounding = 1e-6;
   if (report->stale == 0 || report->longest_stale_s <= needs.max_repeat_s) return;
-  add_problem(
-      &report->findings,
-      fmt::format("pan/tilt {}: while the head turns it repeats an old angle for up to {:.0f} ms; "
-                  "pan_tilt.max_repeat_s is {:.0f} ms, after which that counts as rest: set "
-                  "max_repeat_s: {:.2f}",
-                  needs.source, 1e3 * report->longest_stale_s, 1e3 * needs.max_repeat_s,
-                  std::ceil(100 * kReserve * report->longest_change_s - kRounding) / 100));
+  add_problem(&report->findings,
+              fmt::format("pan/tilt {}: while the head turns, it repeats an old angle for up to "
+                          "{:.0f} ms; after pan_tilt.max_repeat_s, {:.0f} ms, a repeated angle "
+                          "counts as rest: set max_repeat_s: {:.2f}",
+                          needs.source, 1e3 * report->longest_stale_s, 1e3 * needs.max_repeat_s,
+                          std::ceil(100 * kReserve * report->longest_change_s - kRounding) / 100));
 }
 
 // Rounding to steps of q has a standard deviation of q / sqrt(12). If that exceeds the noise that
@@ -110,9 +107,9 @@ void judge_bounds(TelemetryReport* report, const TelemetryNeeds& needs) {
   if (error_px <= kFarthest_px) return;
   add_advice(
       &report->findings,
-      fmt::format("pan/tilt {}: an angle's time is known to {:.0f} ms; at {:.1f} deg/s, as the "
-                  "head turned, that is up to {:.0f} px, beyond the {:.0f} px in which OE mode "
-                  "looks for landmarks: shorten the way to the head, or turn more slowly",
+      fmt::format("pan/tilt {}: an angle's time is known to {:.0f} ms only; at the {:.1f} deg/s "
+                  "measured that is up to {:.0f} px, more than the {:.0f} px within which OE mode "
+                  "looks for landmarks: use a faster link to the head, or turn more slowly",
                   needs.source, 1e3 * report->bounds_s->median, kDegrees * rate, error_px,
                   kFarthest_px));
 }
@@ -121,8 +118,8 @@ void judge_zoom(TelemetryReport* report, const TelemetryNeeds& needs) {
   const std::string where = "pan/tilt " + needs.source + ": ";
   if (report->other_zoom && !needs.has_zoom_curve) {
     add_advice(&report->findings,
-               fmt::format("{}the zoom changed from {} to {}; each zoom has a calibration of its "
-                           "own, none while it changes: hold it",
+               fmt::format("{}the zoom changed from {} to {}; each zoom has its own calibration, "
+                           "and there is none while it changes: keep it constant",
                            where, *report->other_zoom, *report->zoom));
   }
   if (!report->zoom || !needs.zoom ||
@@ -131,11 +128,12 @@ void judge_zoom(TelemetryReport* report, const TelemetryNeeds& needs) {
   }
   const std::string zooms = needs.zooms.empty() ? fmt::format("{}", *needs.zoom) : needs.zooms;
   if (needs.makes_calibrations) {
-    add_advice(&report->findings,
-               fmt::format("{}the zoom is {}, but the calibration is for {}; run has no direction "
-                           "here until it has calibrated, for which the camera has to pan and "
-                           "tilt; or set the camera's zoom back",
-                           where, *report->zoom, zooms));
+    add_advice(
+        &report->findings,
+        fmt::format(
+            "{}the zoom is {}, but the calibration is for {}; run gives no direction at this zoom "
+            "until it has calibrated: pan and tilt the camera, or set its zoom back",
+            where, *report->zoom, zooms));
   } else {
     add_problem(&report->findings,
                 fmt::format("{}the zoom is {}, but the calibration is for {}; set the camera's "
@@ -227,11 +225,10 @@ ReportLines describe(const TelemetryReport& report) {
                                          1e3 * report.bounds_s->median, 1e3 * report.bounds_s->most,
                                          1e3 * report.bounds_s->largest));
   if (report.age_s) {
-    lines.emplace_back(
-        "age", fmt::format("of the newest angle known, as the next one comes: {:.1f} ms median, "
-                           "{:.1f} (95 %), {:.1f} (worst)",
-                           1e3 * report.age_s->median, 1e3 * report.age_s->most,
-                           1e3 * report.age_s->largest));
+    lines.emplace_back("age", fmt::format("of the newest angle when the next one comes: {:.1f} ms "
+                                          "median, {:.1f} (95 %), {:.1f} (worst)",
+                                          1e3 * report.age_s->median, 1e3 * report.age_s->most,
+                                          1e3 * report.age_s->largest));
   }
   if (report.change_hz) {
     lines.emplace_back(
@@ -258,7 +255,7 @@ ReportLines describe(const TelemetryReport& report) {
                            ? fmt::format("{}, changed from {}", *report.zoom, *report.other_zoom)
                            : fmt::format("{}, unchanged", *report.zoom);
     if (report.zoom_jitter.sigma > 0) {
-      zoom += fmt::format("; jitters by {:.2g}, what differs by up to {:.2g} is one zoom",
+      zoom += fmt::format("; jitters by {:.2g}, readings up to {:.2g} apart are one zoom",
                           report.zoom_jitter.sigma, report.zoom_jitter.tolerance);
     }
     if (!report.lens_at_zoom.empty()) zoom += "; " + report.lens_at_zoom;

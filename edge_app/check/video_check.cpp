@@ -68,17 +68,17 @@ void judge_size(VideoReport* report, const VideoNeeds& needs) {
   if (needs.width == 0) return;
   report->size_fits = report->width == needs.width && report->height == needs.height;
   if (report->size_fits) return;
-  add_problem(
-      &report->findings,
-      needs.is_calibrated
-          ? fmt::format("video {}: frames of {}x{} px, but {} is for {}x{} px; set the camera (and "
-                        "video.width and video.height) to this, or calibrate at the frames' size",
-                        needs.source, report->width, report->height, needs.calibration_name,
-                        needs.width, needs.height)
-          : fmt::format("video {}: frames of {}x{} px, but video.width and video.height are {} and "
-                        "{}; set them to {} and {}",
-                        needs.source, report->width, report->height, needs.width, needs.height,
-                        report->width, report->height));
+  add_problem(&report->findings,
+              needs.is_calibrated
+                  ? fmt::format("video {}: frames have {}x{} px, but {} is for {}x{} px; set the "
+                                "camera, video.width and video.height to the calibration's size, "
+                                "or calibrate at the frames' size",
+                                needs.source, report->width, report->height, needs.calibration_name,
+                                needs.width, needs.height)
+                  : fmt::format("video {}: frames have {}x{} px, but video.width and video.height "
+                                "are {} and {}; set them to {} and {}",
+                                needs.source, report->width, report->height, needs.width,
+                                needs.height, report->width, report->height));
 }
 
 void judge_coding(VideoReport* report, const VideoNeeds& needs,
@@ -113,8 +113,8 @@ void judge_losses(VideoReport* report, const VideoNeeds& needs) {
       report->lost.value_or(0) - report->counters.dropped - report->counters.damaged;
   if (report->skips_or_lost) {
     judge(std::max<std::int64_t>(0, elsewhere), "are missing on the camera's clock",
-          "nothing tells whether the camera left them out, as in low light or under load, or the "
-          "link lost them: by transport: tcp it was the camera",
+          "it is unknown whether the camera left them out, as in low light or under load, or the "
+          "link lost them; with transport: tcp it was the camera",
           Severity::kAdvice);
   } else {
     judge(std::max<std::int64_t>(0, elsewhere), "never came",
@@ -146,12 +146,11 @@ void judge_arrival_only(VideoReport* report, const VideoNeeds& needs) {
       report->interval_s->deviation < kLeastScatter_s) {
     return;
   }
-  add_advice(
-      &report->findings,
-      fmt::format("video {}: frames bear no sender's clock and no sequence numbers: their times "
-                  "scatter by {:.1f} ms as they arrive, and PT mode's angles with them; RTSP "
-                  "would tell the camera's clock",
-                  needs.source, 1e3 * report->interval_s->deviation));
+  add_advice(&report->findings,
+             fmt::format("video {}: frames come without the camera's clock and without sequence "
+                         "numbers, so their times scatter by {:.1f} ms, and PT mode's angles "
+                         "accordingly; RTSP would give the camera's clock",
+                         needs.source, 1e3 * report->interval_s->deviation));
 }
 
 std::string milliseconds(const Spread& spread) {

@@ -79,8 +79,8 @@ void set_lens_prior(const CalibrateOptions& options, CalibrationJob* job) {
                             KnownValue* value) {
     if (text.empty()) return;
     value->wanted = false;
-    job->remarks.push_back(
-        fmt::format("{}: {} {} goes before its {}", options.prior, option, text, what));
+    job->remarks.push_back(fmt::format("{0}: its {3} is not used, as {1} {2} is given",
+                                       options.prior, option, text, what));
   };
   give_way("--focal-length", options.focal_length, "focal length", &job->known.focal_length);
   give_way("--aspect", options.aspect, "aspect", &job->known.aspect);

@@ -47,10 +47,10 @@ PatternVideo find_visibly(const CalibrateShutterOptions& options, const KnownPat
 VideoConfig require_live_video(const CalibrateShutterOptions& options) {
   VideoConfig config = require_video_config(options.config);
   if (config.type == VideoConfig::Type::kRecording) {
-    throw CommandError(
-        kExitUsage, fmt::format("{}: video.type: a recording is no live video; give its directory "
-                                "instead: alidade calibrate-shutter {}",
-                                options.config, config.directory));
+    throw CommandError(kExitUsage,
+                       fmt::format("{}: video.type: a recording is not live video; give its "
+                                   "directory instead: alidade calibrate-shutter {}",
+                                   options.config, config.directory));
   }
   return config;
 }
@@ -70,10 +70,9 @@ void check_usage(const CalibrateShutterOptions& options) {
                        "-c camera.yaml for a live one, or --print PAPER");
   }
   if (!options.video.empty() && !options.config.empty()) {
-    throw CommandError(kExitUsage,
-                       fmt::format("calibrate-shutter: {} and -c are two videos; give a "
-                                   "recording or a file, or -c for a live one",
-                                   options.video));
+    throw CommandError(kExitUsage, fmt::format("calibrate-shutter: both {} and -c name a video; "
+                                               "give a recording or a file, or -c for a live one",
+                                               options.video));
   }
   if (options.config.empty() && options.duration_s) {
     throw CommandError(kExitUsage,

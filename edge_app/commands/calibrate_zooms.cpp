@@ -29,8 +29,8 @@ void refuse_priors_of_one_zoom(const CalibrateOptions& options, std::size_t stre
   const auto refuse = [stretches](const char* option, const std::string& text) {
     if (text.empty()) return;
     throw CommandError(kExitUsage,
-                       fmt::format("{} holds at one zoom, and these are {} stretches of constant "
-                                   "zoom; leave it out, or give one recording at one zoom",
+                       fmt::format("{} is valid at one zoom only, but there are {} stretches of "
+                                   "constant zoom; leave it out, or give one recording at one zoom",
                                    option, stretches));
   };
   refuse("--focal-length", options.focal_length);
@@ -40,10 +40,11 @@ void refuse_priors_of_one_zoom(const CalibrateOptions& options, std::size_t stre
 void require_readings(const std::vector<CalibrationJob>& jobs) {
   for (const CalibrationJob& job : jobs) {
     if (job.zoom) continue;
-    throw CommandError(kExitUsage,
-                       fmt::format("{}: telemetry.csv has no zoom reading, which one of several "
-                                   "recordings needs; calibrate it alone, or add the column zoom",
-                                   job.recording));
+    throw CommandError(
+        kExitUsage,
+        fmt::format("{}: telemetry.csv has no zoom readings, which are needed to calibrate several "
+                    "recordings together; calibrate it alone, or add the column zoom",
+                    job.recording));
   }
 }
 
@@ -86,13 +87,13 @@ std::string zooms_text(const ZoomFit& fit, const std::vector<Calibration>& nodes
   line("line_delay", any.line_delay, Parameter::kLineDelay, 1e-6, "us/row");
   line("clock_offset", any.clock_offset, Parameter::kClockOffset, 1e-3, "ms");
   text += fmt::format(
-      "readings agree on what they share: {:.1f}, {} expected; after a movement f may be {:.2g} % "
-      "off\n",
+      "chi-square of what all readings share: {:.1f}, {} expected; after a movement f may be "
+      "{:.2g} % off\n",
       fit.chi_square, fit.degrees_of_freedom, 100 * fit.curve.content().repeatability);
   const auto [usual, largest] = sigmas_between(fit.curve);
-  text +=
-      fmt::format("between them f is known to {:.2g} %, {:.2g} % at most, from {}\n", 100 * usual,
-                  100 * largest, counted(static_cast<std::int64_t>(movements), "movement"));
+  text += fmt::format(
+      "between readings f is known to {:.2g} % (median), {:.2g} % (worst), from {}\n", 100 * usual,
+      100 * largest, counted(static_cast<std::int64_t>(movements), "movement"));
   return text;
 }
 

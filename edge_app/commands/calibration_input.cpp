@@ -182,11 +182,10 @@ std::vector<CalibrationJob> load_calibration_jobs(const std::string& directory,
   }
   const ZoomJitter jitter = steady_zoom(zoom_tolerance, &tables.telemetry);
   if (jitter.sigma > 0) {
-    job.remarks.push_back(
-        fmt::format("telemetry.csv: the zoom reading jitters by {:.2g} (one standard deviation): "
-                    "what differs by up to {:.2g} is taken for one zoom; --zoom-tolerance says "
-                    "otherwise",
-                    jitter.sigma, jitter.tolerance));
+    job.remarks.push_back(fmt::format(
+        "telemetry.csv: the zoom reading jitters by {:.2g} (one standard deviation), so readings "
+        "up to {:.2g} apart are taken for one zoom; --zoom-tolerance sets another limit",
+        jitter.sigma, jitter.tolerance));
   }
   const std::vector<ZoomReading> readings = zoom_readings(tables.telemetry);
   const std::vector<ZoomStretch> all = find_zoom_stretches(readings, {jitter.tolerance});

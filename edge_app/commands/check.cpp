@@ -41,7 +41,7 @@ namespace {
 std::string reverse_advice(const PanTiltConfig& pan_tilt, bool is_pan) {
   const std::string axis = is_pan ? "pan" : "tilt";
   if (pan_tilt.type == PanTiltConfig::Type::kRecording) {
-    return fmt::format("turn the sign of {}_rad in telemetry.csv", axis);
+    return fmt::format("invert the sign of {}_rad in telemetry.csv", axis);
   }
   const bool positive = (is_pan ? pan_tilt.axes.pan : pan_tilt.axes.tilt).sign > 0;
   const char* other = is_pan ? (positive ? "left" : "right") : (positive ? "down" : "up");
@@ -73,8 +73,8 @@ MotionReport motion_of(const Measured& measured, const VideoReport& video,
   needs.reverse_pan = reverse_advice(config.pan_tilt, true);
   needs.reverse_tilt = reverse_advice(config.pan_tilt, false);
   needs.turn_image =
-      "turn it by 180 degrees in the camera's settings and set camera.upside_down: true; if it is "
-      "upright, for pan " +
+      "if the camera hangs upside down, turn its picture by 180 degrees in its settings and set "
+      "camera.upside_down: true; if not, for pan " +
       needs.reverse_pan + ", for tilt " + needs.reverse_tilt;
   needs.no_times = why_no_times(video.clock);
   return check_measured_motion(shifts, telemetry.fresh, needs);

@@ -86,7 +86,7 @@ SceneCheck check_scene(const Config& config, const PublishedCalibration& calibra
     if (has_telemetry(config)) {
       add_advice(&scene.findings, text);
     } else {
-      add_problem(&scene.findings, text + "; until a picture is found there are no directions");
+      add_problem(&scene.findings, text + "; there are no directions until a picture is found");
     }
   } else if (!has_telemetry(config)) {
     const std::string other = another_lens(*scene.found, calibration.calibration, range, name);

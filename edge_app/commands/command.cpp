@@ -330,7 +330,7 @@ void log_source_losses(const FrameSource& source) {
   }
   if (counters.unstamped > 0 || counters.foreign_packets > 0 || counters.garbage_bytes > 0) {
     spdlog::warn(
-        "{}: {} whose time stamp could not be true; {} of another session, and {} of no packet, "
+        "{}: {} had an impossible time stamp; {} of another session and {} outside any packet were "
         "left out",
         source.name(), counted(counters.unstamped, "frame"),
         counted(counters.foreign_packets, "packet"), counted(counters.garbage_bytes, "byte"));

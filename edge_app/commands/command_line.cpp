@@ -80,8 +80,8 @@ void add_record(CLI::App& app, int* exit_code) {
 void add_zoom_tolerance(CLI::App* command, std::optional<double>* tolerance) {
   command
       ->add_option("--zoom-tolerance", *tolerance,
-                   "Zoom readings that differ by no more are one, in units of the device (default: "
-                   "as their jitter shows)")
+                   "Zoom readings up to this far apart are one zoom, in units of the device "
+                   "(default: found from their jitter)")
       ->check(CLI::NonNegativeNumber);
 }
 
@@ -105,18 +105,16 @@ void add_replay(CLI::App& app, int* exit_code) {
       "for stdin; writes targets.jsonl");
   command
       ->add_option("--tracking", options->tracking,
-                   "Configuration whose section tracking counts for them (default: directions, no "
-                   "plane)")
+                   "Configuration whose section tracking is used for them (default: directions, "
+                   "without a plane)")
       ->needs(detections);
   command->add_flag("--realtime", options->realtime, "At the pace of the recording");
   CLI::Option* json = command->add_flag("--json", options->json, "Also on stdout, as JSON Lines");
   command->add_flag("--csv", options->csv, "Also on stdout, as CSV")->excludes(json);
   command->footer(
-      "Reads no configuration: how long telemetry is extrapolated and a repeated angle trusted is "
-      "the default of "
-      "realtime.max_extrapolation_s and pan_tilt.max_repeat_s, whatever they were live. With those "
-      "of a configuration: "
-      "alidade run, with video and pan_tilt of type recording.");
+      "Reads no configuration: realtime.max_extrapolation_s and pan_tilt.max_repeat_s have their "
+      "defaults, whatever they were live. To use a configuration: alidade run, with video and "
+      "pan_tilt of type recording.");
   command->callback([options, exit_code] { *exit_code = replay_recording(*options); });
 }
 
@@ -127,13 +125,12 @@ void add_calibrate(CLI::App& app, int* exit_code) {
                          "Calibrate from a recording's video (or tracks.csv) and telemetry; writes "
                          "calibration.yaml, map.bin and report.html");
   command
-      ->add_option(
-          "recording", options->recordings,
-          "Directory of the recording; several, or one in which the zoom dwells at several "
-          "readings, become one calibration for all zooms between")
+      ->add_option("recording", options->recordings,
+                   "Directory of the recording. Several, or one that dwells at several zooms, give "
+                   "one calibration for all zooms between")
       ->required();
   command->add_option("-o,--output", options->directory,
-                      "Directory for the results (default: DIR/alidade, of several the first's)");
+                      "Directory for the results (default: DIR/alidade of the first recording)");
   add_zoom_tolerance(command, &options->zoom_tolerance);
   command->add_flag("--json", options->json, "The result on stdout as one line of JSON");
   command
@@ -143,9 +140,10 @@ void add_calibrate(CLI::App& app, int* exit_code) {
       ->check(CLI::Range(1, 2))
       ->capture_default_str();
   command
-      ->add_option("--prior", options->prior,
-                   "lens.yaml of alidade calibrate-shutter: line delay at any zoom, focal length "
-                   "and distortion at its own; the options below go before it")
+      ->add_option(
+          "--prior", options->prior,
+          "lens.yaml of alidade calibrate-shutter: its line delay is valid at any zoom, its focal "
+          "length and distortion at its own zoom only; the options below replace its values")
       ->type_name("FILE");
   const char* group = "What is known beforehand: VALUE (exact), VALUE,SIGMA, or free";
   const auto add_prior = [&](const char* name, std::string* text, const char* help) {
@@ -158,7 +156,7 @@ void add_calibrate(CLI::App& app, int* exit_code) {
   add_prior("--clock-offset", &options->clock_offset, "s (default: free)");
   command
       ->add_option("--scale-sigma", options->scale_sigma,
-                   "How well measured angles are known to be true angles, relative (default: "
+                   "Relative sigma of the scale from true to measured angles (default: "
                    "noise.yaml's pan_tilt_scale_sigma, or 1e-8)")
       ->check(is_share)
       ->group(group);
@@ -178,7 +176,7 @@ void add_calibrate_shutter(CLI::App& app, int* exit_code) {
       "is enough");
   command
       ->add_option("--duration", options->duration_s,
-                   "Live: end after so many seconds (default: 60), if not before, as all was shown")
+                   "Live: end after so many seconds (default: 60), or before, when all was shown")
       ->check(is_film_duration);
   command
       ->add_option("--pattern", options->pattern,
@@ -238,20 +236,20 @@ void add_map_build(CLI::App& map, int* exit_code) {
   command->add_option("recording", options->recordings, "Directories of recordings")->required();
   command->add_option("-o,--output", options->map, "File of the map")->required();
   command->add_option("--add", options->add,
-                      "A map whose pictures are taken over; the two may be one file");
+                      "A map whose pictures the new one takes over; both may be the same file");
   command->add_option("--calibration", options->calibration,
                       "Calibration (default: alidade/calibration.yaml in the first recording, if "
                       "it is there)");
   command
       ->add_option("--focal-length", options->focal_length,
-                   "px, by a data sheet; WIDE:TELE at the least and the most zoom reading")
+                   "px, from a data sheet; WIDE:TELE at the least and the greatest zoom reading")
       ->type_name("PX");
   command->add_option("--keyframes", options->keyframes, "Pictures to keep at most")
       ->check(CLI::Range(2, 2000))
       ->capture_default_str();
   command->add_flag("--no-telemetry", options->no_telemetry, "By the pictures alone");
   command->add_flag("--largest-part", options->largest_part,
-                    "Where parts do not hang together, take the largest");
+                    "If the pictures make several unconnected parts, take the largest");
   command->add_flag("--json", options->json, "The result on stdout as one line of JSON");
   command->callback([options, exit_code] { *exit_code = build_map(*options); });
 }
@@ -269,7 +267,7 @@ void add_map(CLI::App& app, int* exit_code) {
     command->callback([options, exit_code, show] { *exit_code = show(*options); });
   };
   add_show("info", "What a scene map holds", show_map);
-  add_show("check", "Whether all of a scene map can be true", check_map);
+  add_show("check", "Whether a scene map is whole and does not contradict itself", check_map);
   auto options = std::make_shared<MapExportCommand>();
   CLI::App* command = map->add_subcommand(
       "export", "keyframes.csv, the keyframes' pictures and panorama.png of a scene map");
@@ -287,9 +285,9 @@ void add_localize(CLI::App& app, int* exit_code) {
       ->add_option("picture", options->pictures, "Files of pictures, and directories of recordings")
       ->required();
   command->add_option("--calibration", options->calibration,
-                      "Of a recording: tells the focal length by the zoom reading");
+                      "Of a recording: gives the focal length for each zoom reading");
   command->add_flag("--no-telemetry", options->no_telemetry, "By the pictures alone");
-  command->add_option("--every", options->every, "Of a recording's frames, every so many")
+  command->add_option("--every", options->every, "Of a recording's frames, use every so many")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   command->callback([options, exit_code] { *exit_code = localize_pictures(*options); });

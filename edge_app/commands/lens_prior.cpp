@@ -51,14 +51,14 @@ KnownCamera load_lens_prior(const std::string& path, int width, int height,
       throw CommandError(
           kExitUsage,
           fmt::format(
-              "{}: is of images of {}x{} px, these are {}x{}, of another shape: what part of "
-              "the sensor they show is not known; calibrate the lens in this video mode",
+              "{}: is for images of {}x{} px, but these have {}x{} px and another shape, so it is "
+              "unknown which part of the sensor they show; calibrate the lens in this video mode",
               path, lens.width, lens.height, width, height));
     }
-    remarks->push_back(fmt::format(
-        "{}: is of images of {}x{} px and is scaled to {}x{}; if the camera reads other "
-        "rows of its sensor in this video mode, calibrate the lens in it",
-        path, lens.width, lens.height, width, height));
+    remarks->push_back(
+        fmt::format("{}: is for images of {}x{} px and is scaled to {}x{}; if the camera reads "
+                    "other rows of its sensor in this video mode, calibrate the lens in this mode",
+                    path, lens.width, lens.height, width, height));
     lens = scaled_lens(lens, width, height);
   }
   const std::optional<LensCamera> nearest =
@@ -66,8 +66,8 @@ KnownCamera load_lens_prior(const std::string& path, int width, int height,
   if (!nearest) {
     throw CommandError(kExitUsage,
                        path +
-                           ": its distortion turns back within the image; show the pattern up to "
-                           "the image's corners when the lens is calibrated");
+                           ": its distortion is not monotone within the image; calibrate the lens "
+                           "again with the pattern shown up to the image's corners");
   }
   const double growth = variance_growth(nearest->covariance);
   const auto known = [&](double value, int row) {

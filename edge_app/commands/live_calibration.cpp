@@ -24,7 +24,8 @@ void set_lens_prior(const Config& config, SelfCalibrationOptions* options) {
     options->data_sheet.line_delay = options->camera.line_delay.prior.value;
   } else {
     spdlog::info(
-        "camera.line_delay_s goes before the line delay of {} until the camera is calibrated",
+        "camera.line_delay_s is used instead of the line delay of {} until the camera is "
+        "calibrated",
         path);
   }
 }
@@ -50,7 +51,7 @@ CalibrationStore::Use lock_store(const Config& config, CalibrationStore* store) 
                                      "to use what that process stores, set calibration.auto: false",
                                      why));
     case FileLock::Result::kImpossible:
-      spdlog::warn("{}; no other process may keep calibrations there", why);
+      spdlog::warn("{}; only one process may store calibrations there", why);
       break;
   }
   return CalibrationStore::Use::kKeep;
@@ -87,12 +88,10 @@ Calibrating begin_calibrating(const Config& config, const std::string& path,
     options.data_sheet = data_sheet_calibration(camera);
   } else {
     throw CommandError(
-        kExitUsage,
-        fmt::format(
-            "{}: camera.focal_length_px is missing: {} holds no calibration to begin with, and the "
-            "first one begins with the data sheet's; give it, or name a calibration in "
-            "calibration.file",
-            path, config.calibration.file));
+        kExitUsage, fmt::format("{}: camera.focal_length_px is missing: {} holds no calibration, "
+                                "and the first one starts from the data sheet's focal length; give "
+                                "it, or name a calibration in calibration.file",
+                                path, config.calibration.file));
   }
   Camera<double>& camera = options.data_sheet.camera;
   camera.width = stored == nullptr ? width : stored->calibration.camera.width;

@@ -51,7 +51,7 @@ std::vector<std::string> read_class_names(const std::string& path) {
     if (line.empty()) continue;
     if (!is_class_name(line)) {
       throw CommandError(
-          kExitUsage, fmt::format("detectors.onnx: {}:{}: is no class's name ({} bytes); expected "
+          kExitUsage, fmt::format("detectors.onnx: {}:{}: is not a class name ({} bytes); expected "
                                   "text of at most {} bytes, without control characters",
                                   path, number, line.size(), kLongestClass));
     }
@@ -117,7 +117,7 @@ DetectorsReport LiveTargets::detectors() const {
 }
 
 void LiveTargets::start() {
-  if (!feed_.start()) throw CommandError(kExitFailed, "there can be no thread for targets");
+  if (!feed_.start()) throw CommandError(kExitFailed, "the thread for targets cannot be started");
 }
 
 void LiveTargets::stop() {
@@ -125,8 +125,7 @@ void LiveTargets::stop() {
   spdlog::info("targets: {}", detections_text(feed_.snapshot().counters));
   if (writer_ && writer_->dropped() > 0)
     spdlog::warn(
-        "{} lines of targets not written, as the reader of output.targets did not take "
-        "them",
+        "{} lines of targets were not written, as the reader of output.targets was too slow",
         writer_->dropped());
 }
 
@@ -134,7 +133,7 @@ std::unique_ptr<LiveTargets> make_live_targets(const Config& config,
                                                const std::shared_ptr<const PlaneEstimate>& plane) {
   if (!config.tracking.targets) return nullptr;
   if (!config.output.http && !config.detectors.any()) {
-    spdlog::info("targets: none, as detections come over HTTP; set output.http, or detectors");
+    spdlog::info("targets: none, as nothing delivers detections; set output.http, or detectors");
     return nullptr;
   }
   return std::make_unique<LiveTargets>(config, plane);

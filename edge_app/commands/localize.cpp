@@ -107,10 +107,9 @@ class Asking {
  private:
   void require_size(const std::string& what, int width, int height) const {
     if (width == width_ && height == height_) return;
-    throw CommandError(kExitUsage,
-                       fmt::format("{}: {}x{} px, but {} is of {}x{} px; a map serves pictures of "
-                                   "its own camera and size",
-                                   what, width, height, options_.map, width_, height_));
+    throw CommandError(kExitUsage, fmt::format("{}: {}x{} px, but {} is for {}x{} px; a map is for "
+                                               "pictures of its own camera and size",
+                                               what, width, height, options_.map, width_, height_));
   }
 
   const LocalizeCommand& options_;

@@ -43,10 +43,11 @@ void require_one_size(const std::vector<MapRecording>& recordings) {
   for (const MapRecording& each : recordings) {
     if (each.info.width == first.width && each.info.height == first.height) continue;
     throw CommandError(
-        kExitUsage, fmt::format("{}: frames of {}x{} px, those of {} have {}x{}; a map is of one "
-                                "camera at one size",
-                                each.directory, each.info.width, each.info.height,
-                                recordings.front().directory, first.width, first.height));
+        kExitUsage,
+        fmt::format(
+            "{}: frames have {}x{} px, those of {} have {}x{}; a map is for one camera at one size",
+            each.directory, each.info.width, each.info.height, recordings.front().directory,
+            first.width, first.height));
   }
 }
 
@@ -70,8 +71,8 @@ struct Pace {
         1e3 * readout_s, 180 / kPi * most_px / longest_f / readout_s, longest_f);
     if (!is_known) {
       out += fmt::format(
-          " (that read-out is a guess: with a calibration, as of `alidade calibrate`, beside the "
-          "first recording or by --calibration, {:g} px are well)",
+          " (that read-out time is a guess; with a calibration beside the first recording, or by "
+          "--calibration, {:g} px are allowed)",
           KeyframeChoiceOptions().most_motion_px * kMostKnownHaste);
     }
     return out;
@@ -156,11 +157,10 @@ SceneMap map_to_add(const std::string& path, const MapBuildOptions& build) {
   std::string error;
   if (!load_scene_map(path, &map, &error, true)) throw CommandError(kExitUsage, error);
   if (map.lens.width() != build.width || map.lens.height() != build.height) {
-    throw CommandError(
-        kExitUsage,
-        fmt::format("{}: is of {}x{} px, the recordings have {}x{}; a map is of one "
-                    "camera at one size",
-                    path, map.lens.width(), map.lens.height(), build.width, build.height));
+    throw CommandError(kExitUsage, fmt::format("{}: is for {}x{} px, but the recordings have "
+                                               "{}x{}; a map is for one camera at one size",
+                                               path, map.lens.width(), map.lens.height(),
+                                               build.width, build.height));
   }
   return map;
 }
@@ -223,15 +223,16 @@ std::string fast_text(const Pace& pace) {
                              names_of(builder, build.groups[g]));
       }
       throw CommandError(
-          kExitFailed, fmt::format("{}: {} parts, of pictures {}{}; add recordings that pass "
-                                   "from one to the other, at zooms between, {}; or take the "
-                                   "largest with --largest-part",
-                                   what, build.groups.size(), parts, fast_text(pace), pace.text()));
+          kExitFailed,
+          fmt::format(
+              "{}: {} unconnected parts, with pictures {}{}; add recordings that pass from one "
+              "part to the other, at zooms between, {}; or take the largest with --largest-part",
+              what, build.groups.size(), parts, fast_text(pace), pace.text()));
     }
     case MapBuildStatus::kNoTexture:
       throw CommandError(kExitFailed,
-                         fmt::format("{}: {} of {} pictures have too little; record by day, where "
-                                     "there is something to be seen",
+                         fmt::format("{}: {} of {} pictures have too little texture; record by "
+                                     "day, where there is something to see",
                                      what, build.without_texture.size(), builder.size()));
     case MapBuildStatus::kNoFocalLength:
       throw CommandError(kExitFailed, what +
@@ -273,8 +274,8 @@ int build_map(const MapBuildCommand& options) {
   if (known != nullptr &&
       (known->camera.width != build.width || known->camera.height != build.height)) {
     throw CommandError(kExitUsage,
-                       fmt::format("{}: is of {}x{} px, the recordings have {}x{}; name the "
-                                   "calibration of this size with --calibration",
+                       fmt::format("{}: is for {}x{} px, but the recordings have {}x{}; give a "
+                                   "calibration for this size with --calibration",
                                    calibration->name, known->camera.width, known->camera.height,
                                    build.width, build.height));
   }
@@ -338,10 +339,11 @@ int build_map(const MapBuildCommand& options) {
   }
   if (builder.size() < 2) {
     throw CommandError(
-        kExitFailed, fmt::format("{} of {} frames can be keyframes{}: a map needs pictures with "
-                                 "telemetry about their time, that move {}; see alidade check",
-                                 builder.size(), recordings.front().frames.size(), fast_text(pace),
-                                 pace.text()));
+        kExitFailed,
+        fmt::format("only {} of {} frames can be keyframes{}; a map needs pictures that have "
+                    "telemetry around their time and move {}; see alidade check",
+                    builder.size(), recordings.front().frames.size(), fast_text(pace),
+                    pace.text()));
   }
   const MapBuild result =
       builder.build([&](double part, const char* what) { progress.say(0.4 + 0.6 * part, what); });
@@ -351,7 +353,8 @@ int build_map(const MapBuildCommand& options) {
                  names_of(builder, result.without_texture));
   }
   if (!result.not_connected.empty()) {
-    spdlog::warn("left out, as they hang on no other: {}", names_of(builder, result.not_connected));
+    spdlog::warn("left out, as they match no other picture: {}",
+                 names_of(builder, result.not_connected));
   }
   if (result.status != MapBuildStatus::kOk) refuse(builder, result, pace);
   if (!save_scene_map(options.map, result.map, &error)) throw CommandError(kExitFailed, error);
@@ -359,7 +362,7 @@ int build_map(const MapBuildCommand& options) {
       options.json ? map_json(result.map, options.map).c_str() : map_text(result.map).c_str(),
       stdout);
   if (!options.json) {
-    std::fputs(fmt::format("{} of {} pictures, {} twos of them compared, {} linked; {} tracks, {} "
+    std::fputs(fmt::format("{} of {} pictures, {} pairs compared, {} linked; {} tracks, {} "
                            "observations, {:.2g} px rms\n",
                            result.map.keyframes.size(), builder.size(), result.compared,
                            result.linked, result.tracks, result.observations, result.residual_px)

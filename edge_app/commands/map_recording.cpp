@@ -77,10 +77,10 @@ double telemetry_time_of(const MapRecording& recording, const FrameStamp& frame,
 double focal_length_of(const std::string& text) {
   const std::optional<double> px = number_of(text);
   if (px && *px >= 10 && *px <= 1e6) return *px;
-  throw CommandError(
-      kExitUsage, fmt::format("--focal-length: '{}' is no focal length in px; give one, as 1250, "
-                              "or WIDE:TELE, as 1250:25000",
-                              text));
+  throw CommandError(kExitUsage,
+                     fmt::format("--focal-length: '{}' is not a focal length in px; give one, such "
+                                 "as 1250, or WIDE:TELE, such as 1250:25000",
+                                 text));
 }
 
 }  // namespace
@@ -122,9 +122,10 @@ FocalLengthKnowledge focal_length_knowledge(const std::string& focal_length,
     const std::size_t colon = focal_length.find(':');
     if (colon == std::string::npos) {
       if (zooms) {
-        throw CommandError(kExitUsage,
-                           "--focal-length: the recordings zoom; give WIDE:TELE, the focal lengths "
-                           "at their least and most reading, or a calibration of several zooms");
+        throw CommandError(
+            kExitUsage,
+            "--focal-length: the recordings zoom; give WIDE:TELE, the focal lengths at the least "
+            "and the greatest reading, or a calibration of several zooms");
       }
       return FocalLengthKnowledge(focal_length_of(focal_length));
     }
@@ -139,8 +140,8 @@ FocalLengthKnowledge focal_length_knowledge(const std::string& focal_length,
   if (calibration != nullptr) return {*calibration, curve};
   if (zooms) {
     throw CommandError(kExitUsage,
-                       "the recordings zoom, and nothing says what their readings mean; give "
-                       "--focal-length WIDE:TELE, or --calibration FILE with zoom_nodes");
+                       "the recordings zoom, but the focal length at their readings is unknown; "
+                       "give --focal-length WIDE:TELE, or --calibration FILE with a zoom_curve");
   }
   return {};
 }

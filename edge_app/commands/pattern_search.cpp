@@ -176,24 +176,23 @@ std::vector<double> PatternSearch::all_times() {
 void PatternSearch::remark_clock() {
   if (unsteady_) {
     video_.remarks.emplace_back(
-        "the frame rate is not steady; time stamps are taken as they are, and their errors are not "
-        "part of any sigma: fix the frame rate, and the exposure with it");
+        "the frame rate is not steady, so time stamps are used as they are, and no sigma includes "
+        "their errors; set a fixed frame rate and exposure");
   }
   if (stamps_left_out_) {
     video_.remarks.emplace_back(
-        "the camera's time stamps run at another rate than its images come, and are left out: "
-        "arrival times instead");
+        "the camera's time stamps run at another rate than its images come, so arrival times are "
+        "used instead");
   }
   if (worst_scatter_ > kMuchJitter) {
     video_.remarks.push_back(
         fmt::format("time stamps scatter by {:.1f} ms about a steady rate of {:.2f} frames a "
-                    "second; if the frame "
-                    "rate varies in truth, fix it, and the exposure with it",
+                    "second; if the frame rate really varies, set a fixed frame rate and exposure",
                     1e3 * scatter_s_, 1 / period_s_));
   }
   if (video_.lost > 0)
     video_.remarks.push_back(
-        fmt::format("{} images are missing by their time stamps", video_.lost));
+        fmt::format("{} images are missing, as their time stamps show", video_.lost));
 }
 
 PatternVideo PatternSearch::finish() {

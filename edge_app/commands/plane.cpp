@@ -79,12 +79,12 @@ std::string text_of(const PlaneEvidence& evidence, const PlaneFit& fit) {
   text += fmt::format("{} data, {} more equations than unknowns", evidence.data.size(),
                       fit.degrees_of_freedom);
   if (fit.degrees_of_freedom > 0)
-    text += fmt::format("; residuals are {:.2f} of what their sigmas say", fit.noise_scale);
+    text += fmt::format("; residuals are {:.2f} times what their sigmas predict", fit.noise_scale);
   text += "; misfits:\n" + data_text(evidence, fit);
   if (fit.origin_below_camera)
-    text += "nothing says where the camera stands: x and y are counted from below it\n";
+    text += "the camera's place is not given: x and y are measured from the point below it\n";
   if (fit.heading_of_base)
-    text += "nothing says where north is: y lies below the base's forward direction\n";
+    text += "the direction of north is not given: y points along the base's forward direction\n";
   return text;
 }
 

@@ -239,8 +239,8 @@ void say_what_is_missing(const std::string& directory, const Recorder& recorder,
   constexpr double kShare = 0.95;
   if (recorder.frames() > 0 && recorder.length_s() < kShare * asked_s) {
     spdlog::warn(
-        "{}: {:.1f} s are stored of the {:g} s asked for: video stopped coming, or began "
-        "anew; see `alidade check`",
+        "{}: only {:.1f} s are stored of the {:g} s asked for, as the video stopped or began anew; "
+        "see `alidade check`",
         directory, recorder.length_s(), asked_s);
   }
 }
@@ -256,8 +256,8 @@ int record_streams(const RecordOptions& options) {
   }
   if (config.pan_tilt.type == PanTiltConfig::Type::kNone) {
     throw CommandError(kExitUsage, options.config +
-                                       ": pan_tilt.type: none, but a recording is of video and "
-                                       "telemetry; name the pan/tilt source");
+                                       ": pan_tilt.type: none, but a recording needs telemetry, "
+                                       "too; name the pan/tilt source");
   }
   prepare_directory(options.directory);
   write_side_files(config, options.directory);

@@ -65,9 +65,8 @@ PublishedCalibration find_calibration(const ReplayOptions& options) {
   if (!fs::exists(beside)) {
     throw CommandError(
         kExitUsage,
-        fmt::format("{0}: has no calibration ({1}): make one with `alidade calibrate {0}`, or name "
-                    "the one that `alidade run` has stored, its calibration.file, with "
-                    "--calibration FILE",
+        fmt::format("{0}: has no calibration ({1}); make one with `alidade calibrate {0}`, or give "
+                    "the calibration.file of `alidade run` with --calibration FILE",
                     options.recording, beside.string()));
   }
   return require_calibration_file(beside.string());
@@ -79,10 +78,10 @@ void check_size(const RecordingInfo& info, const PublishedCalibration& calibrati
   if (info.width == camera.width && info.height == camera.height) return;
   throw CommandError(
       kExitFailed,
-      fmt::format(
-          "{}: frames of {}x{} px, but {} is for {}x{} px; name the calibration of this size with "
-          "--calibration, or record with the calibration's as video.width and video.height",
-          recording, info.width, info.height, calibration.name, camera.width, camera.height));
+      fmt::format("{}: frames have {}x{} px, but {} is for {}x{} px; give a calibration for this "
+                  "size with --calibration, or record at the calibration's size",
+                  recording, info.width, info.height, calibration.name, camera.width,
+                  camera.height));
 }
 
 // The next item of a recording; empty at its end.

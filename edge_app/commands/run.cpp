@@ -175,7 +175,8 @@ int run_live(const RunOptions& options) {
   sources.camera = video->name();
   sources.latency_measured = of_pipeline.measure_latency;
   const auto http = start_http(config, sources, &tap);
-  if (mqtt && !mqtt->start()) throw CommandError(kExitFailed, "there can be no thread for MQTT");
+  if (mqtt && !mqtt->start())
+    throw CommandError(kExitFailed, "the thread for MQTT cannot be started");
   if (targets) targets->start();
   pipeline.start();
   const ServiceManager manager;
@@ -195,7 +196,7 @@ int run_live(const RunOptions& options) {
   spdlog::info("{}", describe(summary, of_pipeline.measure_latency));
   log_source_losses(*video);
   if (writer.dropped() > 0)
-    spdlog::warn("{} records not written, as the reader of stdout did not take them",
+    spdlog::warn("{} records were not written, as the reader of stdout was too slow",
                  writer.dropped());
   if (!pipeline.error().empty()) throw CommandError(kExitFailed, pipeline.error());
   return kExitOk;

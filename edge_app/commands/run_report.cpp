@@ -81,9 +81,7 @@ void LifeReport::tell() {
     manager_.alive();
     pipeline_.ask_for_pulse();
   } else if (lived_) {
-    spdlog::error(
-        "no record gets through: a thread hangs; systemd is no longer told that this process "
-        "lives");
+    spdlog::error("no record comes out, as a thread hangs; systemd no longer gets a sign of life");
   }
   lived_ = lives;
   const double now_s = monotonic_now_s();

@@ -27,10 +27,11 @@ std::unique_ptr<SceneLocalization> load_scene(const Config& config,
   const auto file = std::make_shared<SceneMapFile>();
   if (!open_scene(scene_map, camera.width, camera.height, file.get(), &map, &error)) {
     if (!has_telemetry(config)) {
-      throw CommandError(kExitUsage,
-                         fmt::format("scene map: {}; pan_tilt.type none needs one", error));
+      throw CommandError(
+          kExitUsage,
+          fmt::format("scene map: {}; with pan_tilt.type none a scene map is needed", error));
     }
-    spdlog::error("scene map: {}; runs without it", error);
+    spdlog::error("scene map: {}; run goes on without it", error);
     return nullptr;
   }
   spdlog::info("scene map: {}, {} keyframes, {} landmarks", scene_map.file, map.keyframes.size(),

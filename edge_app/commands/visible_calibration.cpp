@@ -78,10 +78,10 @@ void use_tracks(VideoTracks tracks, CalibrationJob* job, std::vector<std::string
     untracked[frame.frame] = why == found.end() ? Untracked::kNoPicture : why->second;
   }
   if (before <= kMaxObservations) return;
-  remarks->push_back(fmt::format(
-      "video: {} of {} observations are used, as more than {} take too long: evenly over the "
-      "recording, of the points that moved farthest",
-      job->input.observations.size(), before, kMaxObservations));
+  remarks->push_back(
+      fmt::format("video: only {} of {} observations are used, as more than {} take too long: "
+                  "those of the points that moved farthest, evenly over the recording",
+                  job->input.observations.size(), before, kMaxObservations));
 }
 
 // Finds tracks, with a first estimate unless `estimate` is null, and calibrates with them.
@@ -136,9 +136,10 @@ CalibrationResult calibrate_job(int passes, CalibrationJob* job, StopSignals* si
     } else {
       job->input.observations = first_tracks;
       job->untracked = first_untracked;
-      remarks.push_back(fmt::format(
-          "the second look at the video led to no calibration ({}: {}); this is the first one's",
-          to_string(second.result.status), second.result.message));
+      remarks.push_back(
+          fmt::format("the second look at the video gave no calibration ({}: {}), so this one is "
+                      "from the first look",
+                      to_string(second.result.status), second.result.message));
     }
   }
   return finish(std::move(first));

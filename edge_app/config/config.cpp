@@ -73,7 +73,7 @@ SceneMapConfig read_scene_map(YamlSection section, const std::string& path) {
       section.number("zero_sigma_rad", {1e-7, 0.5, "rad"}).value_or(scene_map.zero_sigma_rad);
   scene_map.update = section.truth("update").value_or(scene_map.update);
   if (scene_map.update && scene_map.file.empty())
-    section.fail("update", "is true, but there is no map to keep up; add file");
+    section.fail("update", "is true, but there is no map to update; add file");
   scene_map.correct_moved_base =
       section.choice("on_moved_base", {"correct", "report"}).value_or("correct") == "correct";
   section.finish();
@@ -129,7 +129,7 @@ void read_tokens(YamlSection& section, const std::string& path, HttpServerOption
   const std::optional<std::string> several = section.text("tokens_file");
   if (!variable && !one && !several) return;
   const char* key = variable ? "token_env" : one ? "token_file" : "tokens_file";
-  if (!section.has("http")) section.fail(key, "stands without http; add http");
+  if (!section.has("http")) section.fail(key, "is given without http; add http");
   if (variable && one) section.fail("token_file", "and token_env exclude each other; keep one");
   if (several && (variable || one))
     section.fail("tokens_file", fmt::format("and {} exclude each other; keep one", key));
@@ -162,7 +162,7 @@ void read_tokens(YamlSection& section, const std::string& path, HttpServerOption
 std::optional<HttpTlsOptions> read_tls(YamlSection& section, const std::string& path) {
   YamlSection tls = section.section("tls");
   if (!section.has("tls")) return std::nullopt;
-  if (!section.has("http")) section.fail("tls", "stands without http; add http");
+  if (!section.has("http")) section.fail("tls", "is given without http; add http");
   HttpTlsOptions options;
   options.certificate = path_relative_to(path, required_text(tls, "certificate", "server.pem"));
   options.key = path_relative_to(path, required_text(tls, "key", "server.key"));
@@ -204,7 +204,7 @@ void check_ages(const Config& config, const YamlSection& pan_tilt, const YamlSec
   const double repeat_s = config.pan_tilt.max_repeat_s;
   const double extrapolation_s = config.realtime.max_extrapolation_s;
   if (repeat_s == 0 || repeat_s < extrapolation_s) return;
-  const std::string why = "so that a head at rest has no angle that is new enough; expected ";
+  const std::string why = "so a head at rest never has an angle that is new enough; expected ";
   const std::string right_repeat =
       extrapolation_s > 0 ? fmt::format("less than {}", extrapolation_s) : "0";
   if (pan_tilt.has("max_repeat_s")) {
@@ -225,12 +225,12 @@ void check_without_telemetry(const Config& config, const YamlSection& pan_tilt,
                              const YamlSection& calibration, const YamlSection& realtime) {
   if (config.scene_map.file.empty()) {
     pan_tilt.fail("type",
-                  "none, and no scene map tells where the camera looks; set scene_map.file to one "
-                  "of alidade map build, or name the pan/tilt source");
+                  "none, but no scene map shows where the camera looks; set scene_map.file to a "
+                  "map of alidade map build, or name the pan/tilt source");
   }
   if (config.calibration.file.empty()) {
     pan_tilt.fail("type",
-                  "none, and nothing can be calibrated without telemetry; set calibration.file to "
+                  "none, but nothing can be calibrated without telemetry; set calibration.file to "
                   "a calibration of this camera");
   }
   if (config.calibration.automatic && calibration.has("auto")) {
@@ -238,12 +238,11 @@ void check_without_telemetry(const Config& config, const YamlSection& pan_tilt,
         "auto", "is true, but pan_tilt.type none has nothing to calibrate with; set it to false");
   }
   if (!config.realtime.landmarks) {
-    realtime.fail("mode",
-                  "is PT, which is telemetry's alone; with pan_tilt.type none set it to OE");
+    realtime.fail("mode", "is PT, which needs telemetry; with pan_tilt.type none set it to OE");
   }
   if (config.video.type == VideoConfig::Type::kRecording) {
     pan_tilt.fail("type",
-                  "none is for live video; a recording has its telemetry, set it to recording");
+                  "none is for live video only; a recording has telemetry: set it to recording");
   }
 }
 
@@ -262,7 +261,7 @@ void check_together(const Config& config, const YamlSection& calibration,
                           config.video.type != VideoConfig::Type::kRecording;
   if (!config.calibration.prior.empty() && !calibrates) {
     warnings->push_back(calibration.where("prior") +
-                        ": is not used, as nothing is calibrated: that takes live video, "
+                        ": is not used, as nothing is calibrated; calibrating needs live video, "
                         "realtime.mode OE and calibration.auto true");
   }
   if (!config.scene_map.file.empty() && !config.realtime.landmarks) {
@@ -281,14 +280,13 @@ void check_detectors(const Config& config, const YamlSection& detectors) {
   for (const DetectorKindRow& row : kDetectorKinds) {
     if (!config.detectors.has(row.kind)) continue;
     if (!config.tracking.targets)
-      detectors.fail(row.name, "stands without section tracking; add tracking");
+      detectors.fail(row.name, "is given without section tracking; add tracking");
     if (!config.realtime.landmarks) {
-      detectors.fail(row.name,
-                     "looks at frames in OE mode only, and realtime.mode is PT; set it to OE");
+      detectors.fail(row.name, "works in OE mode only, but realtime.mode is PT; set it to OE");
     }
     if (row.needs_ground && config.tracking.plane.empty()) {
       detectors.fail(row.name,
-                     "takes the ground, which tells how large targets are in the picture; add "
+                     "needs the ground to know how large targets are in the picture; add "
                      "tracking.plane, a plane.yaml of alidade plane fit");
     }
   }
@@ -297,10 +295,10 @@ void check_detectors(const Config& config, const YamlSection& detectors) {
 // Detections come over HTTP or from the built-in detectors.
 void check_targets(const Config& config, const YamlSection& output) {
   if (!config.output.targets.empty() && !config.tracking.targets)
-    output.fail("targets", "stands without section tracking; add tracking");
+    output.fail("targets", "is given without section tracking; add tracking");
   if (!config.output.targets.empty() && !config.output.http && !config.detectors.any())
     output.fail("targets",
-                "stands without http, over which detections come; add http, or detectors");
+                "is given without http, over which detections come; add http, or detectors");
 }
 
 void read_config(YamlSection& top, const std::string& path, ConfigScope scope, Config* config) {

@@ -23,7 +23,7 @@ ByteLinkOptions read_link(YamlSection& section, const std::string& config_path) 
   ByteLinkOptions link;
   const std::optional<std::string> device = section.text("device");
   const std::optional<std::string> url = section.text("url");
-  if (device && url) section.fail("url", "stands beside device; keep one");
+  if (device && url) section.fail("url", "and device exclude each other; keep one");
   if (url) {
     if (!is_byte_link_url(*url)) {
       section.fail("url", "is not an address tcp://host:port or udp://host:port");
@@ -38,7 +38,7 @@ ByteLinkOptions read_link(YamlSection& section, const std::string& config_path) 
   link.baud = section.integer("baud", {1200, 115200, "baud"}).value_or(link.baud);
   if (!is_baud(link.baud)) {
     section.fail("baud",
-                 "is no speed of a serial line; expected 1200, 2400, 4800, 9600, 19200, 38400, "
+                 "is not a speed of a serial line; expected 1200, 2400, 4800, 9600, 19200, 38400, "
                  "57600 or 115200");
   }
   return link;
@@ -106,7 +106,7 @@ HeadOptions read_protocol(YamlSection& section, HeadType type, const ByteLinkOpt
     case HeadType::kPtu:
       return read_ptu(section);
   }
-  section.fail("type", "is no head on a line");
+  section.fail("type", "is not a head on a line");
 }
 
 }  // namespace

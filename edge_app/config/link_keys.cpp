@@ -53,7 +53,7 @@ void read_login(YamlSection& section, std::string* user, std::string* password) 
   *user = section.text("user").value_or("");
   const std::optional<std::string> variable = section.text("password_env");
   if (!variable) return;
-  if (user->empty()) section.fail("password_env", "stands without a user; add user");
+  if (user->empty()) section.fail("password_env", "is given without a user; add user");
   const char* value = std::getenv(variable->c_str());
   if (value == nullptr) {
     section.fail("password_env",

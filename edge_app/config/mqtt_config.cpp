@@ -18,7 +18,7 @@ void read_broker(YamlSection& section, MqttOptions* mqtt) {
   if (!parse_url(text, &url, &error) || url.host.empty())
     section.fail("url", "is not an address; expected for example mqtt://broker:1883");
   if (!url.path.empty() && url.path != "/")
-    section.fail("url", "has a path, which a broker has none of; see mqtt.prefix for topics");
+    section.fail("url", "has a path, but a broker has none; set the topics by mqtt.prefix");
   mqtt->tls = is_by_tls(url.scheme);
   mqtt->host = url.host;
   // An IPv6 address stands in brackets.
@@ -41,7 +41,7 @@ void read_tls_files(YamlSection& section, const std::string& config_path, MqttOp
   }
   if (mqtt->certificate_file.empty() != mqtt->key_file.empty()) {
     section.fail(mqtt->key_file.empty() ? "certificate_file" : "key_file",
-                 "stands alone; give certificate_file and key_file");
+                 "is given alone; give certificate_file and key_file");
   }
 }
 
@@ -55,8 +55,8 @@ std::string read_prefix(YamlSection& section, const std::string& usual) {
                         });
   if (!is_topic) {
     section.fail("prefix",
-                 "is no topic; expected for example site/mast, letters, digits and signs without "
-                 "blanks, + and #, and no / or $ at its beginning, no / at its end");
+                 "is not a topic; expected for example site/mast, letters, digits and signs "
+                 "without blanks, + and #, and no / or $ at its beginning, no / at its end");
   }
   return prefix;
 }
@@ -70,7 +70,7 @@ MqttOptions read_mqtt(YamlSection section, const std::string& config_path,
   read_tls_files(section, config_path, &mqtt);
   read_login(section, &mqtt.user, &mqtt.password);
   if (const auto file = section.text("password_file")) {
-    if (mqtt.user.empty()) section.fail("password_file", "stands without a user; add user");
+    if (mqtt.user.empty()) section.fail("password_file", "is given without a user; add user");
     if (section.has("password_env"))
       section.fail("password_file", "and password_env exclude each other; keep one");
     mqtt.password =

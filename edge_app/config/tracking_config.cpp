@@ -25,11 +25,10 @@ void read_space_keys(YamlSection& section, TargetTrackerOptions* tracker) {
   for (const char* key :
        {others.acceleration_density, others.first_velocity_sigma, others.most_sigma}) {
     if (!section.has(key)) continue;
-    section.fail(key, on_plane
-                          ? "is for targets on the sphere, and these are on the plane; expected "
-                            "the key with m, or space: sphere"
-                          : "is for targets on a plane, and these are on the sphere; expected "
-                            "the key with rad, or plane: plane.yaml");
+    section.fail(key, on_plane ? "is for targets on the sphere, but these are on the plane; "
+                                 "expected the key with m, or space: sphere"
+                               : "is for targets on a plane, but these are on the sphere; expected "
+                                 "the key with rad, or plane: plane.yaml");
   }
   const NumberRange accelerations =
       on_plane ? NumberRange{1e-6, 1e4, "m^2/s^3"} : NumberRange{1e-12, 100, "rad^2/s^3"};
@@ -49,7 +48,7 @@ TargetSpace read_space(YamlSection& section, bool has_plane) {
   if (*space == "sphere") return TargetSpace::kSphere;
   if (!has_plane)
     section.fail("space",
-                 "is plane, and there is none; add plane: plane.yaml of alidade plane fit");
+                 "is plane, but no plane is given; add plane: plane.yaml of alidade plane fit");
   return TargetSpace::kPlane;
 }
 
@@ -79,10 +78,10 @@ TrackingConfig read_tracking(YamlSection section, bool is_there, const std::stri
   tracker.birth_hits =
       section.integer("birth_hits", {1, 32, "frames"}).value_or(tracker.birth_hits);
   if (tracker.birth_hits > tracker.birth_looks) {
-    section.fail(section.has("birth_hits") ? "birth_hits" : "birth_looks",
-                 fmt::format("leaves {} hits of {} looks; expected birth_hits no more than "
-                             "birth_looks",
-                             tracker.birth_hits, tracker.birth_looks));
+    section.fail(
+        section.has("birth_hits") ? "birth_hits" : "birth_looks",
+        fmt::format("asks for {} hits in {} looks; expected birth_hits no more than birth_looks",
+                    tracker.birth_hits, tracker.birth_looks));
   }
   tracker.lose_after_s =
       section.number("lose_after_s", {0.01, 600, "s"}).value_or(tracker.lose_after_s);

@@ -85,7 +85,7 @@ void read_live_keys(YamlSection& section, VideoConfig* video) {
   video->width = section.integer("width", kPixels).value_or(0);
   video->height = section.integer("height", kPixels).value_or(0);
   if ((video->width == 0) != (video->height == 0))
-    section.fail(video->width == 0 ? "height" : "width", "stands alone; give width and height");
+    section.fail(video->width == 0 ? "height" : "width", "is given alone; give width and height");
   video->timeout_s = section.number("timeout_s", kSeconds).value_or(video->timeout_s);
   video->max_backoff_s = section.number("max_backoff_s", kSeconds).value_or(video->max_backoff_s);
 }

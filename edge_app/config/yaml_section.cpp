@@ -59,10 +59,10 @@ YamlSection::YamlSection(const YAML::Node& node, std::string name, std::string f
   const std::optional<FaultyKey> found = find_faulty_key(node_);
   if (!found) return;
   const std::string at = place(file_, found->key);
-  throw ConfigError(
-      found->fault == KeyFault::kNoWord
-          ? fmt::format("{}: {}: a key must be a plain word", at, title)
-          : fmt::format("{}: {}: key '{}' stands twice; keep one", at, title, found->key.Scalar()));
+  throw ConfigError(found->fault == KeyFault::kNoWord
+                        ? fmt::format("{}: {}: a key must be a plain word", at, title)
+                        : fmt::format("{}: {}: key '{}' is given twice; keep one", at, title,
+                                      found->key.Scalar()));
 }
 
 std::optional<YAML::Node> YamlSection::find(const std::string& key) const {

@@ -180,8 +180,8 @@ SceneLocator::Outcome SceneLocalization::judge(const LocalizableFrame& frame,
     case BaseJudge::Verdict::kExpected:
       report_.uncorrected = false;
       if (is_first && has_telemetry_) {
-        spdlog::info("scene map: frame {} is localized; telemetry's angles lack {}", told->frame,
-                     describe(offset));
+        spdlog::info("scene map: frame {} is localized; telemetry's angles are too small by {}",
+                     told->frame, describe(offset));
       }
       return Outcome::kTold;
     case BaseJudge::Verdict::kSuspected:
@@ -203,7 +203,7 @@ void SceneLocalization::say_moved(std::int64_t frame, const BaseOffset& offset, 
   if (is_said) return;
   ++report_.movements;
   report_.moved = offset;
-  spdlog::warn("scene map: {} has moved, as frame {} shows: {} angles lack {}{}",
+  spdlog::warn("scene map: {} has moved, as frame {} shows: {} angles are too small by {}{}",
                has_telemetry_ ? "telemetry's zero or the base" : "the base, or what was followed,",
                frame, has_telemetry_ ? "telemetry's" : "the followed", describe(offset),
                is_corrected

@@ -40,7 +40,7 @@ void SceneUpkeep::show(const Localization& found, const FeatureSet& features, do
 }
 
 void SceneUpkeep::stop(const std::string& error) {
-  spdlog::error("scene map: {}; it is not kept up any more until the next start", error);
+  spdlog::error("scene map: {}; the map is not updated any more until the next start", error);
   store_ = nullptr;
   report_.stopped = true;
 }

@@ -45,7 +45,7 @@ bool parse_json_object(const std::string& body, int deepest, const std::set<std:
     *error = "the body must be a JSON object";
     for (const char* word : {"NaN", "Infinity"}) {
       if (object->is_discarded() && body.find(word) != std::string::npos)
-        *error += std::string("; ") + word + " is no number of JSON";
+        *error += std::string("; ") + word + " is not a JSON number";
     }
     return false;
   }

@@ -161,9 +161,9 @@ void MqttConnection::fail(int error_number, int code) {
   } else if (code == MOSQ_ERR_ERRNO) {
     static_cast<void>(fail_with(std::generic_category().message(error_number)));
   } else if (code == MOSQ_ERR_CONN_LOST && !connected_) {
-    static_cast<void>(fail_with(
-        "no connection, or closed before an answer; is a broker there, and does mqtt.url say "
-        "rightly whether with TLS (mqtts://)?"));
+    static_cast<void>(
+        fail_with("no connection, or it was closed before an answer; is a broker there, and is TLS "
+                  "right in mqtt.url (mqtts:// or mqtt://)?"));
   } else if (code == MOSQ_ERR_KEEPALIVE) {
     static_cast<void>(fail_with("the broker has fallen silent"));
   } else {
@@ -246,14 +246,14 @@ bool MqttConnection::read_answers() {
     const Incoming incoming = look_at_what_comes();
     if (incoming == Incoming::kForeign) {
       return fail_with(
-          "what comes is no answer that a broker gives to a publisher; is a broker there, and does "
-          "mqtt.url say rightly whether with TLS (mqtts://)?");
+          "the answer is not one that a broker gives to a publisher; is a broker there, and is TLS "
+          "right in mqtt.url (mqtts:// or mqtt://)?");
     }
     if (incoming == Incoming::kHalfAnswer) {
       const double now_s = monotonic_now_s();
       if (half_since_s_ < 0) half_since_s_ = now_s;
       if (now_s - half_since_s_ < kHalf_s) return true;
-      return fail_with("half an answer has come, and the other half has not");
+      return fail_with("only half of an answer has come");
     }
     half_since_s_ = -1;
     if (incoming == Incoming::kNothing) return true;

@@ -7,6 +7,7 @@
 #include <algorithm>
 
 #include "core/calibration/number_text.h"
+#include "edge_app/storage/named_values.h"
 
 namespace alidade {
 
@@ -24,16 +25,7 @@ std::string format_lens(const PatternCalibration& calibration, const LensNotes& 
         << exact_text(calibration.sigma(parameter)) << YAML::EndMap;
     if (parameter == LensParameter::kLineDelay) out << YAML::Comment("s/row");
   }
-  out << YAML::Key << "covariance" << YAML::Value << YAML::BeginMap << YAML::Key << "names"
-      << YAML::Value << YAML::Flow << YAML::BeginSeq;
-  for (const char* name : kLensParameterNames) out << name;
-  out << YAML::EndSeq << YAML::Key << "matrix" << YAML::Value << YAML::BeginSeq;
-  for (int i = 0; i < kLensParameterCount; ++i) {
-    out << YAML::Flow << YAML::BeginSeq;
-    for (int j = 0; j < kLensParameterCount; ++j) out << exact_text(calibration.covariance(i, j));
-    out << YAML::EndSeq;
-  }
-  out << YAML::EndSeq << YAML::EndMap;
+  write_covariance(kLensParameterNames, calibration.covariance, &out);
   out << YAML::Key << "quality" << YAML::Value << YAML::BeginMap;
   out << YAML::Key << "pattern" << YAML::Value << YAML::DoubleQuoted << notes.pattern;
   out << YAML::Key << "frames" << YAML::Value << calibration.frames;

@@ -5,6 +5,7 @@
 #include "core/calibration/estimate_reader.h"
 #include "core/calibration/number_text.h"
 #include "edge_app/storage/lens_file.h"
+#include "edge_app/storage/named_values.h"
 #include "platform/streams/picture_size.h"
 #include "platform/system/whole_file.h"
 
@@ -26,20 +27,13 @@ EstimateRange plausible_range(LensParameter parameter) {
   }
 }
 
-// The largest plausible standard deviation, in the unit of the value.
-double largest_sigma(LensParameter parameter) {
-  const EstimateRange range = plausible_range(parameter);
-  return range.most - range.least;
-}
-
 class LensReader {
  public:
   LensReader(const YAML::Node& root, const std::string& name) : file_(root, name) {}
 
   LensEstimate read() const {
-    const std::vector<std::string> names(kLensParameterNames.begin(), kLensParameterNames.end());
     std::vector<std::string> known = {"format", "image"};
-    known.insert(known.end(), names.begin(), names.end());
+    known.insert(known.end(), kLensParameterNames.begin(), kLensParameterNames.end());
     known.insert(known.end(), {"covariance", "quality"});
     file_.check_top("a lens", known);
     LensEstimate estimate;
@@ -48,33 +42,14 @@ class LensReader {
       file_.fail(file_.root()["image"],
                  "image is larger than " + std::to_string(kMostPictureSide) + " px");
     }
-    EstimateRows rows{names, {}, join(names), "the unit of the value"};
-    std::vector<double> sigmas;
-    for (int i = 0; i < kLensParameterCount; ++i) {
-      const auto parameter = static_cast<LensParameter>(i);
-      const std::string& name = names[static_cast<std::size_t>(i)];
-      const YAML::Node entry = file_.entry(name);
-      estimate.lens[i] = file_.value(entry, name, plausible_range(parameter));
-      rows.largest_sigma.push_back(largest_sigma(parameter));
-      const YAML::Node sigma = file_.required(entry, "sigma", name + ".");
-      sigmas.push_back(file_.number(sigma, name + ".sigma"));
-      if (sigmas.back() < 0 || sigmas.back() > rows.largest_sigma.back()) {
-        file_.fail(sigma, name + ".sigma is " + short_text(sigmas.back()) +
-                              "; one standard deviation, in the unit of the value, is needed");
-      }
-    }
+    const NamedValues<kLensParameterCount> values = read_named_values(
+        file_, kLensParameterNames,
+        [](std::size_t i) { return plausible_range(static_cast<LensParameter>(i)); },
+        "the unit of the value", "parameters");
+    estimate.lens = values.value;
+    estimate.covariance = values.covariance;
     check_plausible(estimate);
     const YAML::Node& root = file_.root();
-    const YAML::Node covariance = file_.required(root, "covariance", "");
-    file_.read_covariance(covariance, rows, estimate.covariance);
-    if (covariance["names"].size() != names.size()) {
-      file_.fail(covariance["names"],
-                 "covariance.names lacks some of the parameters; name all of " + join(names));
-    }
-    for (int i = 0; i < kLensParameterCount; ++i) {
-      const auto at = static_cast<std::size_t>(i);
-      file_.check_sigma(root[names[at]]["sigma"], names[at], sigmas[at], estimate.covariance(i, i));
-    }
     if (root["quality"] && !root["quality"].IsMap()) {
       file_.fail(root["quality"], "quality is not a map; write `quality: {name: value, ...}`");
     }

@@ -4,6 +4,7 @@
 #include "core/calibration/estimate_reader.h"
 #include "core/calibration/number_text.h"
 #include "core/model/trigonometry.h"
+#include "edge_app/storage/named_values.h"
 #include "edge_app/storage/plane_file.h"
 #include "platform/system/whole_file.h"
 
@@ -32,40 +33,15 @@ class PlaneReader {
   PlaneReader(const YAML::Node& root, const std::string& name) : file_(root, name) {}
 
   PlaneEstimate read() const {
-    const std::vector<std::string> names(kPlaneValueNames.begin(), kPlaneValueNames.end());
     std::vector<std::string> known = {"format", "origin"};
-    known.insert(known.end(), names.begin(), names.end());
+    known.insert(known.end(), kPlaneValueNames.begin(), kPlaneValueNames.end());
     known.insert(known.end(), {"covariance", "quality"});
     file_.check_top("a plane", known);
     const YAML::Node& root = file_.root();
     PlaneEstimate estimate;
     if (root["origin"]) estimate.origin = read_origin(root["origin"]);
-    EstimateRows rows{names, {}, join(names), "rad or m"};
-    Matrix<double, kPlaneParameterCount, 1> value;
-    std::vector<double> sigmas;
-    for (std::size_t i = 0; i < names.size(); ++i) {
-      const EstimateRange range = plausible_plane_range(i);
-      const YAML::Node entry = file_.entry(names[i]);
-      value[static_cast<Eigen::Index>(i)] = file_.value(entry, names[i], range);
-      rows.largest_sigma.push_back(range.most - range.least);
-      const YAML::Node sigma = file_.required(entry, "sigma", names[i] + ".");
-      sigmas.push_back(file_.number(sigma, names[i] + ".sigma"));
-      if (sigmas.back() < 0 || sigmas.back() > rows.largest_sigma.back()) {
-        file_.fail(sigma, names[i] + ".sigma is " + short_text(sigmas.back()) +
-                              "; one standard deviation, in the unit of the value, is needed");
-      }
-    }
-    const YAML::Node covariance = file_.required(root, "covariance", "");
-    PlaneCovariance cov = PlaneCovariance::Zero();
-    file_.read_covariance(covariance, rows, cov);
-    if (covariance["names"].size() != names.size()) {
-      file_.fail(covariance["names"],
-                 "covariance.names lacks some of the values; name all of " + join(names));
-    }
-    for (std::size_t i = 0; i < names.size(); ++i) {
-      const auto at = static_cast<Eigen::Index>(i);
-      file_.check_sigma(root[names[i]]["sigma"], names[i], sigmas[i], cov(at, at));
-    }
+    const auto [value, cov] =
+        read_named_values(file_, kPlaneValueNames, plausible_plane_range, "rad or m", "values");
     if (root["quality"] && !root["quality"].IsMap()) {
       file_.fail(root["quality"], "quality is not a map; write `quality: {name: value, ...}`");
     }

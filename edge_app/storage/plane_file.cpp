@@ -6,6 +6,7 @@
 
 #include "core/calibration/number_text.h"
 #include "core/model/trigonometry.h"
+#include "edge_app/storage/named_values.h"
 
 namespace alidade {
 namespace {
@@ -40,16 +41,7 @@ std::string format_plane(const PlaneEstimate& estimate, const PlaneFit& fit) {
         << "sigma" << YAML::Value << exact_text(std::sqrt(values.covariance(i, i))) << YAML::EndMap
         << YAML::Comment(kMeanings[at]);
   }
-  out << YAML::Key << "covariance" << YAML::Value << YAML::BeginMap << YAML::Key << "names"
-      << YAML::Value << YAML::Flow << YAML::BeginSeq;
-  for (const char* name : kPlaneValueNames) out << name;
-  out << YAML::EndSeq << YAML::Key << "matrix" << YAML::Value << YAML::BeginSeq;
-  for (int i = 0; i < kPlaneParameterCount; ++i) {
-    out << YAML::Flow << YAML::BeginSeq;
-    for (int j = 0; j < kPlaneParameterCount; ++j) out << exact_text(values.covariance(i, j));
-    out << YAML::EndSeq;
-  }
-  out << YAML::EndSeq << YAML::EndMap;
+  write_covariance(kPlaneValueNames, values.covariance, &out);
   out << YAML::Key << "quality" << YAML::Value << YAML::BeginMap;
   out << YAML::Key << "data" << YAML::Value << fit.data.size();
   out << YAML::Key << "degrees_of_freedom" << YAML::Value << fit.degrees_of_freedom;

@@ -285,7 +285,8 @@ ReadStatus HttpPollingSource::follow_redirection() {
     error = "more than " + std::to_string(kMostRedirections) + " redirections";
   } else if (error.empty() && !next.takes_login && request_.body_logs_in) {
     error = "redirected to " + shown_url(next.url) +
-            ": refused, as the request holds the login, which goes to url only: set url to that";
+            ": refused, as the request holds the login, which is sent to url only; set url to that "
+            "address";
   }
   if (!error.empty()) {
     conversation_->reset();

@@ -118,13 +118,13 @@ void OnvifLoginWays::accepted() {
 std::string OnvifLoginWays::text_of(Way way) const {
   switch (way) {
     case Way::kDeviceClock:
-      return std::string(tells_utc_ ? "the clock that it tells ("
-                                    : "the local time that it tells (") +
+      return std::string(tells_utc_ ? "the clock that it reports ("
+                                    : "the local time that it reports (") +
              lead_text(lead_s(way).value_or(0)) + " this host's)";
     case Way::kHostClock:
       return "this host's clock";
     case Way::kLocalClock:
-      return "the local time that it tells";
+      return "the local time that it reports";
     case Way::kDigest:
       break;
   }
@@ -135,16 +135,16 @@ std::string OnvifLoginWays::note() const {
   const std::optional<double> told_s = lead_s(Way::kDeviceClock);
   if (good_ == Way::kHostClock && told_s && std::abs(*told_s) >= kSameClock_s) {
     if (!tells_utc_) {
-      return "the device tells a local time and no UTC, but takes logins by this host's clock "
-             "alone; logins go by that";
+      return "the device reports a local time and no UTC, but accepts logins by this host's clock "
+             "only; that clock is used for logins";
     }
-    return "the device tells a UTC " + lead_text(*told_s) +
-           " this host's, but takes logins by this host's alone; is that its local time? Logins go "
-           "by this host's clock";
+    return "the device reports a UTC " + lead_text(*told_s) +
+           " this host's, but accepts logins by this host's clock only; is its UTC really its "
+           "local time? This host's clock is used for logins";
   }
   if (good_ == Way::kLocalClock) {
-    return "the device takes logins by its local time alone, not by the UTC that it tells; logins "
-           "go by that";
+    return "the device accepts logins by its local time only, not by the UTC that it reports; its "
+           "local time is used for logins";
   }
   return {};
 }

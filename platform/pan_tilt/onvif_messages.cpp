@@ -337,7 +337,7 @@ bool parse_onvif_status(std::string_view body, OnvifStatus* status, std::string*
   const std::optional<double> tilt = attribute(pan_tilt, "y");
   if (!pan || !tilt) {
     *error = pan_tilt ? "the position's x or y is not a number"
-                      : "the device tells its status without a position";
+                      : "the device reports its status without a position";
     return false;
   }
   status->pan = *pan;

@@ -113,7 +113,7 @@ OnvifScale::Outcome OnvifScale::angles(const OnvifStatus& status, double* pan_ra
   if (!pan_.scale && !degrees && !any_wide && !is_generic(status.space)) {
     *error =
         "the position is in the space '" + shown(status.space, kShownSpace) +
-        "'; known are PositionGenericSpace and SphericalPositionSpaceDegrees; of another one, " +
+        "'; known are PositionGenericSpace and SphericalPositionSpaceDegrees; for another one, " +
         kKeys;
     return Outcome::kOutside;
   }
@@ -159,12 +159,12 @@ std::string OnvifScale::note(const OnvifStatus& status) const {
   if (range == nullptr) return {};
   if (!is_sound(range->pan) || !is_sound(range->tilt)) {
     return "the device declares " + text_of(*range) +
-           ", which is no range; taken as -1..1 where it is none";
+           ", which is not a range; -1..1 is used for an axis without one";
   }
   if (is_half(*range)) {
     return "the device declares " + text_of(*range) +
            ", a part of -1..1: pan_range_deg and tilt_range_deg are taken as the angles at -1 and "
-           "1; if they are those at these ends, add " +
+           "1; if they are the angles at the declared ends, add " +
            as_scales(*range);
   }
   if (!is_wide(range->pan) && !is_wide(range->tilt)) return {};
@@ -172,7 +172,8 @@ std::string OnvifScale::note(const OnvifStatus& status) const {
          (pan_.angles && tilt_.angles && !is_degrees(range->space)
               ? " in place of -1..1: pan_range_deg and tilt_range_deg are taken as the angles at "
                 "these ends"
-              : " in place of -1..1: taken as degrees, 0 where pan_zero_deg and tilt_zero_deg say");
+              : " in place of -1..1: taken as degrees, with zero at pan_zero_deg and "
+                "tilt_zero_deg");
 }
 
 }  // namespace alidade

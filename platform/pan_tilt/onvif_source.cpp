@@ -254,8 +254,8 @@ HttpConversation::Outcome OnvifConversation::not_here(std::string* error) {
       if (!services_error_.empty()) *error = services_error_;
       if (!ptz_.is_found() && options_.ptz_path.empty()) {
         *error +=
-            "; no PTZ service is where the device says or where usual: if you know its path, give "
-            "it as pan_tilt.ptz_path, with a port of its own as ':PORT/PATH'";
+            "; no PTZ service answers where the device says or at the usual paths; if you know its "
+            "path, give it as pan_tilt.ptz_path, with another port as ':PORT/PATH'";
       }
       break;
     case Step::kClock:

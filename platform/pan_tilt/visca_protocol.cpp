@@ -198,9 +198,9 @@ std::string ViscaProtocol::peculiarity() const {
     return {};
   }
   return std::string("the device's answers ") +
-         (heard_number_ ? "do not bear the sequence numbers of their queries"
-                        : "have no right VISCA header") +
-         "; the order in which they come counts instead";
+         (heard_number_ ? "do not have the sequence numbers of their queries"
+                        : "have no valid VISCA header") +
+         "; they are matched by their order instead";
 }
 
 Answer ViscaProtocol::find(std::string_view bytes) {

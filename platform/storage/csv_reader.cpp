@@ -84,7 +84,7 @@ std::string find_columns(const std::vector<CsvColumn>& columns,
     if (found != names.end()) {
       places->back() = static_cast<std::size_t>(found - names.begin());
       if (std::find(found + 1, names.end(), column.name) != names.end()) {
-        return std::string("column '") + column.name + "' stands twice";
+        return std::string("column '") + column.name + "' is given twice";
       }
     } else if (column.required) {
       return std::string("no column '") + column.name + "'";

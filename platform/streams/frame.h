@@ -11,9 +11,8 @@ namespace alidade {
 
 // The message to the user about interlaced video.
 inline constexpr const char* kInterlaced =
-    "the video is interlaced: every other row is of another moment, half a frame apart, which no "
-    "camera model here knows; set "
-    "the camera to progressive";
+    "the video is interlaced: every second row is captured half a frame later, which the camera "
+    "model does not cover; set the camera to progressive";
 
 // What a frame's receive time refers to.
 enum class StampedAt : std::uint8_t {

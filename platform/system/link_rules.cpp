@@ -72,7 +72,7 @@ Redirection judge_redirection(const Url& configured, const std::string& asked,
 
 std::string login_wanted_elsewhere(const std::string& url) {
   return "redirected to " + shown_url(url) +
-         ", which wants a login (401); it goes to url only: set url to that";
+         ", which wants a login (401), but the login is sent to url only; set url to that address";
 }
 
 }  // namespace alidade

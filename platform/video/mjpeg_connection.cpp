@@ -103,7 +103,7 @@ std::size_t MjpegConnection::on_body(char* data, std::size_t size, std::size_t c
   connection->take_bytes({data, bytes}, arrival_s);
   if (connection->useless_in_a_row_ <= kUselessInARow) return bytes;
   connection->refusal_ = "more than " + std::to_string(kUselessInARow) +
-                         " parts in a row are no pictures: no camera's stream";
+                         " parts in a row are not pictures: this is not a camera's stream";
   return 0;
 }
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <chrono>
 #include <cstring>
 #include <optional>
 #include <utility>
@@ -110,31 +109,16 @@ MjpegSource::MjpegSource(const MjpegSourceOptions& options) : options_(options) 
 }
 
 ReadStatus MjpegSource::read(Frame& frame, double timeout_s) {
-  const auto deadline =
-      std::chrono::steady_clock::now() + std::chrono::duration_cast<std::chrono::nanoseconds>(
-                                             std::chrono::duration<double>(timeout_s));
   if (failed_) {
     return thread_.stopped() ? ReadStatus::kStopped : ReadStatus::kFailed;
   }
-  for (;;) {
-    MultipartPart part;
-    std::string error;
-    ReadStatus status = thread_.next(deadline, &part, &error);
-    if (status == ReadStatus::kFailed) {
-      return fail(error);
-    }
-    if (status == ReadStatus::kDisconnected) {
-      error_ = name_ + ": " + error;
-      restarted_ = true;
-    }
-    if (status != ReadStatus::kOk) {
-      return status;
-    }
-    status = deliver(std::move(part), frame);
-    if (status != ReadStatus::kTimeout) {
-      return status;
-    }
-  }
+  return thread_.read(
+      timeout_s, [&](auto part) { return deliver(std::move(part), frame); },
+      [&](const std::string& error) {
+        error_ = name_ + ": " + error;
+        restarted_ = true;
+      },
+      [&](const std::string& error) { return fail(error); });
 }
 
 // Makes a frame from a part; kTimeout if this part gives none.
@@ -179,11 +163,7 @@ ReadStatus MjpegSource::deliver(MultipartPart part, Frame& frame) {
   frame.stamp.receive_time_s = part.first_byte_s;
   frame.stamp.restarted = std::exchange(restarted_, false);
   stamp_sender_time(part, &frame.stamp);
-  frame.width = picture.width;
-  frame.height = picture.height;
-  frame.luma = picture.luma;
-  frame.stride = picture.stride;
-  frame.owner = std::move(picture.owner);
+  set_picture(std::move(picture), &frame);
   if (options_.decode && fits) {
     frame.decode_s = decode_s;
   }

@@ -5,6 +5,9 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <utility>
+
+#include "platform/streams/frame.h"
 
 namespace alidade {
 
@@ -20,5 +23,15 @@ struct Picture {
   bool interlaced = false;             // coded as two fields, or as one frame of two fields
   std::shared_ptr<const void> owner;
 };
+
+// The picture becomes the frame's, with its size.
+inline void set_picture(Picture picture, Frame* frame) {
+  frame->width = picture.width;
+  frame->height = picture.height;
+  frame->luma = picture.luma;
+  frame->stride = picture.stride;
+  frame->interlaced = picture.interlaced;
+  frame->owner = std::move(picture.owner);
+}
 
 }  // namespace alidade

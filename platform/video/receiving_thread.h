@@ -98,6 +98,27 @@ class ReceivingThread {
     return event.status;
   }
 
+  // FrameSource::read(), as long as the source has not failed. deliver(picture) makes the frame, or
+  // returns kTimeout if this picture gives none. lost(error) takes a report; failed(error) returns
+  // kFailed.
+  template <class Deliver, class Lost, class Failed>
+  [[nodiscard]] ReadStatus read(double timeout_s, const Deliver& deliver, const Lost& lost,
+                                const Failed& failed) {
+    const auto deadline =
+        std::chrono::steady_clock::now() + std::chrono::duration_cast<std::chrono::nanoseconds>(
+                                               std::chrono::duration<double>(timeout_s));
+    for (;;) {
+      Picture picture;
+      std::string error;
+      ReadStatus status = next(deadline, &picture, &error);
+      if (status == ReadStatus::kFailed) return failed(error);
+      if (status == ReadStatus::kDisconnected) lost(error);
+      if (status != ReadStatus::kOk) return status;
+      status = deliver(std::move(picture));
+      if (status != ReadStatus::kTimeout) return status;
+    }
+  }
+
   // For the connection: queues a picture of this size.
   void push(Picture picture, std::size_t bytes) {
     {

@@ -171,9 +171,8 @@ bool FramesOnDisk::rows_are_in_order() {
   if (order_is_checked_) return true;
   error_ =
       options_.directory +
-      "/frames.csv: sender_time_s steps back, and video.mkv has B-frames: rows in the order in "
-      "which packets came do not belong to its pictures; sort them by sender_time_s, or record "
-      "without B-frames";
+      "/frames.csv: sender_time_s steps back, and video.mkv has B-frames, so its rows are in the "
+      "order of packets, not of pictures; sort them by sender_time_s, or record without B-frames";
   return false;
 }
 
@@ -181,9 +180,9 @@ std::vector<std::string> FramesOnDisk::remarks() const {
   std::vector<std::string> remarks;
   if (has_b_frames_) {
     remarks.push_back(options_.directory +
-                      "/video.mkv has B-frames: row k of frames.csv has to be that of the k-th "
-                      "picture taken; where rows were written as packets came, stamps are wrong by "
-                      "some frames: record without B-frames");
+                      "/video.mkv has B-frames: row k of frames.csv must belong to the k-th "
+                      "picture in order of capture; if rows were written in the order of packets, "
+                      "stamps are wrong by some frames: record without B-frames");
   }
   if (interlaced_) remarks.push_back(options_.directory + ": " + kInterlaced);
   return remarks;
@@ -231,7 +230,9 @@ ReadStatus FramesOnDisk::next_image(Frame* frame) {
       return file.is_open();
     });
     if (type == kImageTypes.end()) {
-      return fail(path + ": no such picture with .png, .jpg or .pgm, but a row in frames.csv");
+      return fail(
+          path +
+          ": frames.csv has a row for this picture, but there is no .png, .jpg or .pgm of it");
     }
     if (type->codec != image_codec_) {
       const std::shared_ptr<AVCodecParameters> parameters(avcodec_parameters_alloc(), AvDeleter());

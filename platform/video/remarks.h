@@ -35,11 +35,10 @@ class Remarks {
 // For a time stamp that cannot be true and is off by off_s.
 [[nodiscard]] inline std::string bad_stamp_remark(double off_s) {
   char text[192];
-  std::snprintf(
-      text, sizeof text,
-      "a picture's time stamp cannot be true: it is %+.3g s off the others; such pictures "
-      "are counted and have no stamp: a fault of the camera's clock",
-      off_s);
+  std::snprintf(text, sizeof text,
+                "a picture's time stamp cannot be true: it is %+.3g s off the others; such stamps "
+                "are counted and left out: a fault of the camera's clock",
+                off_s);
   return text;
 }
 

@@ -94,7 +94,8 @@ ReadStatus RtpConnection::nothing_received(std::string* error) const {
                                              : "nothing received for %g s",
                 options_.timeout_s);
   *error = text;
-  if (foreign() > 0 && !filter_.source()) *error += "; what comes is of " + foreign_kind();
+  if (foreign() > 0 && !filter_.source())
+    *error += "; the packets that come are of " + foreign_kind();
   if (arrival_s_ > 0 && !any_picture_ && options_.url.rfind("rtp://", 0) == 0) {
     *error += "; is what comes " + options_.format + "?";
   }

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <deque>
@@ -248,12 +247,12 @@ void RtpSource::count(const RtpConnection& connection) {
   const std::string of = options_.url + ": ";
   if (now.foreign_packets > counted_.foreign_packets) {
     remarks_.say(kForeignPackets, of + "packets of " + connection.foreign_kind() +
-                                      " come among the video's; the session has not agreed upon "
-                                      "them: they are counted and left out");
+                                      " come between those of the video; the session did not "
+                                      "announce them, so they are counted and left out");
   }
   if (now.garbage_bytes > counted_.garbage_bytes) {
-    remarks_.say(kGarbage, of + "bytes come that belong to no packet; they are counted and passed "
-                                "over: a fault of the camera, or of a relay in between");
+    remarks_.say(kGarbage, of + "bytes come that belong to no packet; they are counted and "
+                                "skipped: a fault of the camera, or of a relay in between");
   }
   if (now.unstamped > counted_.unstamped) {
     remarks_.say(kBadStamp, of + bad_stamp_remark(connection.bad_stamp_off_s()));
@@ -269,32 +268,17 @@ void RtpSource::interrupt() {
 }
 
 ReadStatus RtpSource::read(Frame& frame, double timeout_s) {
-  const auto deadline =
-      std::chrono::steady_clock::now() + std::chrono::duration_cast<std::chrono::nanoseconds>(
-                                             std::chrono::duration<double>(timeout_s));
   if (failed_) {
     return thread_.stopped() ? ReadStatus::kStopped : ReadStatus::kFailed;
   }
-  for (;;) {
-    Arrived arrived;
-    std::string error;
-    ReadStatus status = thread_.next(deadline, &arrived, &error);
-    if (status == ReadStatus::kFailed) {
-      return fail(std::move(error));
-    }
-    if (status == ReadStatus::kDisconnected) {
-      error_ = options_.url + ": " + error;
-      restarted_ = true;
-      no_key_after_loss_since_s_ = -1;
-    }
-    if (status != ReadStatus::kOk) {
-      return status;
-    }
-    status = deliver(std::move(arrived), frame);
-    if (status != ReadStatus::kTimeout) {
-      return status;
-    }
-  }
+  return thread_.read(
+      timeout_s, [&](auto arrived) { return deliver(std::move(arrived), frame); },
+      [&](const std::string& error) {
+        error_ = options_.url + ": " + error;
+        restarted_ = true;
+        no_key_after_loss_since_s_ = -1;
+      },
+      [&](const std::string& error) { return fail(error); });
 }
 
 // Makes a frame from a picture's data; kTimeout if this picture gives none.

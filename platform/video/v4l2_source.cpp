@@ -218,11 +218,7 @@ ReadStatus V4l2Source::take(Frame& frame) {
   frame.stamp.stamped_at = stamp.stamped_at;
   frame.stamp.sequence = stamp.sequence;
   frame.stamp.restarted = std::exchange(restarted_, false);
-  frame.width = picture.width;
-  frame.height = picture.height;
-  frame.luma = picture.luma;
-  frame.stride = picture.stride;
-  frame.owner = std::move(picture.owner);
+  set_picture(std::move(picture), &frame);
   if (options_.decode) {
     frame.decode_s = decode_s;
   }

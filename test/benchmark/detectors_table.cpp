@@ -29,7 +29,7 @@ BuiltInDetectorOptions all_but_a_network() {
 // The detectors, and whoever else finds things in the same pictures: boxes that stand in the sky.
 class Load final : public FrameDetector, public Beside {
  public:
-  Load() { require(found_.start() && crowd_.start(), "there can be no thread for targets"); }
+  Load() { require(found_.start() && crowd_.start(), "the thread for targets cannot be started"); }
   void look(const DetectableFrame& frame) override {
     detectors_.look(frame);
     DetectedFrame crowd{frame.record, {}};

@@ -109,7 +109,7 @@ class MovedZero(WithSceneMap):
         for file, words in ((broken, "broken.map"), (self.folder / "none.map", "none.map")):
             config = self.write_config(camera, realtime={"mode": "OE"}, scene_map={"file": str(file)})
             run = self.alidade("run", "-c", config)
-            wait_until(lambda: "runs without it" in run.error_text(), "the error")
+            wait_until(lambda: "run goes on without it" in run.error_text(), "the error")
             self.assertIn(words, run.error_text())
             while json.loads(run.line())["mode"] == "none":
                 pass
@@ -228,7 +228,7 @@ class NoTelemetry(WithSceneMap):
             self.assertGreaterEqual(upkeep["updates"], 1)
             self.assertFalse(upkeep["stopped"])
             run.end(signal.SIGKILL)
-            self.assertNotIn("kept up any more", run.error_text())
+            self.assertNotIn("updated any more", run.error_text())
             checked = subprocess.run([ALIDADE, "map", "check", scene_map], capture_output=True, text=True, timeout=60)
             self.assertEqual(checked.returncode, 0, checked.stdout + checked.stderr)
         camera.end(signal.SIGTERM)
@@ -246,7 +246,7 @@ class NoTelemetry(WithSceneMap):
         run = self.alidade("run", "-c", config)
         code, _ = run.end()
         self.assertEqual(code, 2)
-        self.assertIn("pan_tilt.type none needs one", run.error_text())
+        self.assertIn("with pan_tilt.type none a scene map is needed", run.error_text())
 
 
 if __name__ == "__main__":

@@ -104,7 +104,7 @@ class Service(SystemTest):
                 records, said = run.communicate()
             finally:
                 run.kill()
-        self.assertRegex(said, r"[1-9]\d* records not written, as the reader of stdout did not take them")
+        self.assertRegex(said, r"[1-9]\d* records were not written, as the reader of stdout was too slow")
         for line in records.splitlines():
             json.loads(line)
 

@@ -124,10 +124,9 @@ std::optional<ServerResponse> HttpGate::check(const HttpHead& head, double now_s
   // not even Sec-Fetch-Site.
   if (access == HttpAccess::kStream && !tokens_.any() && head.of_browser &&
       !shows_ticket(head, now_s))
-    return http_error(
-        403,
-        "a browser needs a ticket of POST /api/v1/stream/ticket for this, as ?ticket=; "
-        "other clients send no headers of browsers, or set a token");
+    return http_error(403,
+                      "a browser needs a ticket from POST /api/v1/stream/ticket for this, as "
+                      "?ticket=; other clients must leave out a browser's headers, or set a token");
   return std::nullopt;
 }
 

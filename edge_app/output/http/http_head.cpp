@@ -76,7 +76,7 @@ std::vector<std::string> content_lengths(std::string_view text) {
 // Why the length of the body is not known. Then the end of the body is not known either.
 std::optional<ServerResponse> length_refusal(const HttpHead& head) {
   if (head.transfer_encoding || head.content_lengths.size() > 1)
-    return http_error(411, "the request must tell the length of its body, once");
+    return http_error(411, "the request must state the length of its body exactly once");
   if (head.content_encoding) return http_error(415, "the body must not be compressed");
   if (!head.content_lengths.empty() &&
       (head.content_lengths[0].empty() ||

@@ -151,7 +151,7 @@ std::shared_ptr<HttpTls::Context> HttpTls::context(double now_s) {
     said_ = false;
     seen_ = {FileStamp(options_.certificate), FileStamp(options_.key)};
   } else if (!std::exchange(said_, true)) {
-    spdlog::warn("HTTP: {}; the certificate of before goes on", error);
+    spdlog::warn("HTTP: {}; the earlier certificate stays in use", error);
   }
   return context_;
 }

@@ -30,7 +30,7 @@ bool parse_only_token(const std::string& text, std::vector<HttpToken>* tokens, s
   std::string line = text.substr(0, text.find('\n'));
   boost::algorithm::trim(line);
   if (!is_usable_token(line)) {
-    *error = "its first line is no token that can be used";
+    *error = "its first line is not a token that can be used";
     return false;
   }
   *tokens = {{line, HttpRight::kControl}};
@@ -67,8 +67,9 @@ bool parse_tokens(const std::string& text, std::vector<HttpToken>* tokens, std::
           fmt::format("has no token of at least {} letters, digits or signs", kShortestToken));
     const bool is_twice = std::any_of(tokens->begin(), tokens->end(),
                                       [&](const HttpToken& one) { return one.text == token; });
-    if (is_twice) return fail("has a token that stands there before");
-    if (tokens->size() == kMostTokens) return fail(fmt::format("is beyond {} tokens", kMostTokens));
+    if (is_twice) return fail("repeats an earlier token");
+    if (tokens->size() == kMostTokens)
+      return fail(fmt::format("is more than the {} tokens allowed", kMostTokens));
     tokens->push_back({token, right == "view" ? HttpRight::kView : HttpRight::kControl});
   }
   if (!tokens->empty()) return true;
@@ -112,7 +113,7 @@ void HttpTokens::read_if_changed(double now_s) {
     if (!good) error = file_ + ": " + error;
   }
   if (!good) {
-    spdlog::warn("HTTP: {}; the tokens of before go on", error);
+    spdlog::warn("HTTP: {}; the earlier tokens stay in use", error);
     return;
   }
   tokens_ = std::move(tokens);

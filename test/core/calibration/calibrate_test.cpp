@@ -456,7 +456,7 @@ TEST(Calibrate, NamesTheAxesThatCountTheOtherWay) {
       const CalibrationResult result = calibrate(input);
       EXPECT_EQ(result.status, CalibrationStatus::kTelemetryMismatch) << result.message;
       EXPECT_THAT(result.message, StartsWith(named(pan, tilt)));
-      EXPECT_THAT(result.message, HasSubstr("the image moves the other way"));
+      EXPECT_THAT(result.message, HasSubstr("the image moves in the opposite direction"));
     }
   }
 }

@@ -252,7 +252,7 @@ TEST(CalibrationText, RefusesAFaultyLineWithItsNumberAndARemedy) {
       {3, "focal_length: {sigma: 24}", "focal_length.value is missing"},
       {3, "focal_length: {value: 32008, sigma: -24}", "focal_length.sigma is -24"},
       {3, "focal_length: {value: 32008, sigma: .nan}", "a finite number"},
-      {3, "focal_length: {value: 32008, value: 32009}", "focal_length.value stands here a second"},
+      {3, "focal_length: {value: 32008, value: 32009}", "focal_length.value is given twice"},
       {3, "focal_length: {value: 32008, stddev: 24}", "unknown key focal_length.stddev"},
       {3, "focal_lenght: {value: 32008}", "unknown key focal_lenght; known are format"},
       {4, "aspect: {value: 16}", "a ratio near 1"},
@@ -330,8 +330,9 @@ TEST(CalibrationText, RefusesAFaultyCovariance) {
               HasSubstr("not positive semidefinite"));
   EXPECT_THAT(refusal(with("[focal_length, aspect]", "[[576, 1e-9], [1e-9, 0]]")),
               HasSubstr("covariance.matrix ties focal_length to aspect"));
-  EXPECT_THAT(refusal(with(two, "[[577, 0], [0, 0.0122]]")),
-              HasSubstr("sigma of radial_distortion is 0.11, its covariance says 0.110454"));
+  EXPECT_THAT(
+      refusal(with(two, "[[577, 0], [0, 0.0122]]")),
+      HasSubstr("sigma of radial_distortion is 0.11, but by its covariance it is 0.110454"));
   EXPECT_THAT(refusal(with(two, "[[576, 0]]")), HasSubstr("a row for each of the 2 names"));
   EXPECT_THAT(refusal(with(two, "[[576], [0, 1]]")), HasSubstr("a list of 2 numbers"));
   EXPECT_THAT(refusal(with(two, "[[576, x], [0, 1]]")), HasSubstr("a finite number"));

@@ -90,8 +90,9 @@ TEST(KnownCamera, AtAnotherZoomOnlyWhatIsTheSensorsCounts) {
   known.focal_length.prior.value /= 3;
   const KnownCameraCalibration c = calibrate_knowing(simulate(s), {}, known);
   ASSERT_TRUE(c.result.ok()) << c.result.message;
-  EXPECT_THAT(c.remarks, ElementsAre(HasSubstr("lens.yaml: found at another zoom, focal length and "
-                                               "distortion do not count here: 1333")));
+  EXPECT_THAT(c.remarks,
+              ElementsAre(HasSubstr("lens.yaml: focal length and distortion were found at "
+                                    "another zoom and are not used: 1333")));
   EXPECT_FALSE(c.options.focal_length);
   EXPECT_FALSE(c.options.radial_distortion);
   EXPECT_TRUE(c.options.line_delay);
@@ -162,7 +163,7 @@ TEST(KnownCamera, WithoutASolutionOfTheRecordingAloneItSaysWhatIsTakenOnTrust) {
   s.path = [](double) { return Eigen::Vector2d(0.1, 0.2); };
   const KnownCameraCalibration c = calibrate_knowing(simulate(s), {}, true_camera(s));
   EXPECT_EQ(c.result.status, CalibrationStatus::kNoMotion);
-  EXPECT_THAT(c.remarks, ElementsAre(HasSubstr("line delay and aspect are taken on trust")));
+  EXPECT_THAT(c.remarks, ElementsAre(HasSubstr("line delay and aspect are used unchecked")));
   EXPECT_FALSE(c.options.focal_length);
 }
 

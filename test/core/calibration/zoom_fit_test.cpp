@@ -400,7 +400,7 @@ TEST(ZoomFit, RefusesWhatIsNoCurveOfOneCamera) {
     bad[1].covariance.row(index(p)).setZero();
     bad[1].covariance.col(index(p)).setZero();
   }
-  EXPECT_THAT(refusal(bad), HasSubstr("do not take the same parameters as exact"));
+  EXPECT_THAT(refusal(bad), HasSubstr("do not hold the same parameters exact"));
 }
 
 // In sigmas of `of`, and the largest change of a sigma.
@@ -568,7 +568,7 @@ TEST(ZoomExtension, RefusesWhatIsNotOfThisCamera) {
   bad = good;
   bad.covariance.row(index(Parameter::kCentreU)).setZero();
   bad.covariance.col(index(Parameter::kCentreU)).setZero();
-  EXPECT_THAT(refusal(bad), HasSubstr("do not take the same parameters as exact"));
+  EXPECT_THAT(refusal(bad), HasSubstr("do not hold the same parameters exact"));
   bad = good;
   bad.covariance(index(Parameter::kClockOffset), index(Parameter::kLineDelay)) = 1;
   bad.covariance(index(Parameter::kLineDelay), index(Parameter::kClockOffset)) = 1;

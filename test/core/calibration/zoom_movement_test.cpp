@@ -231,7 +231,7 @@ TEST(ZoomMovement, SaysWhyItTellsNothing) {
   EXPECT_THAT(refusal(bad, curve), HasSubstr("not finite"));
   bad = good;
   for (CalibrationObservation& o : bad.input.observations) o.sigma_px = 0.005;
-  EXPECT_THAT(refusal(bad, curve), HasSubstr("times as far off as they say"));
+  EXPECT_THAT(refusal(bad, curve), HasSubstr("times their sigmas off"));
 }
 
 // Calibrations at the rests, each with the eps of its visit, and the movements between.

@@ -126,7 +126,7 @@ TEST(MotionCheck, FindsAImageTurnedByAQuarter) {
   for (TimedShift& shift : scene.shifts) shift.shift = {shift.shift[1], -shift.shift[0]};
   const MotionReport report = scene.check();
   EXPECT_TRUE(report.quarter_turn);
-  EXPECT_THAT(problems(report.findings), ElementsAre(HasSubstr("turned by a quarter")));
+  EXPECT_THAT(problems(report.findings), ElementsAre(HasSubstr("turned by 90 degrees")));
 }
 
 TEST(MotionCheck, SaysHowFarTheFocalLengthIsOff) {
@@ -177,7 +177,7 @@ TEST(MotionCheck, TellsNothingOfAImageThatGoesItsOwnWay) {
   EXPECT_THAT(report.findings, IsEmpty());
 }
 
-// Whatever the image seems to show: the right signs, one reversed, upside down, turned by a quarter.
+// Whatever the image seems to show: the right signs, one reversed, upside down, turned by 90 degrees.
 TEST(MotionCheck, TellsNoSignsWithoutTimes) {
   std::vector<Scene> scenes = {Scene(wander), Scene(wander, {1, -1}), Scene(wander, {-1, -1}),
                                Scene(wander)};
@@ -201,8 +201,8 @@ TEST(MotionCheck, TellsNoSignsWithoutTimes) {
 
 TEST(MotionCheck, NoticesAHeadThatReportsOneAngleWithoutTimes) {
   Scene scene(wander, {0, 0});
-  scene.needs.no_times = "the camera's time stamps are no times";
-  EXPECT_THAT(problems(scene.check().findings), ElementsAre(HasSubstr("always the same angles")));
+  scene.needs.no_times = "the camera's time stamps are not times";
+  EXPECT_THAT(problems(scene.check().findings), ElementsAre(HasSubstr("the angles never change")));
 }
 
 TEST(MotionCheck, AsksToMoveACameraAtRest) {
@@ -215,13 +215,14 @@ TEST(MotionCheck, AsksToMoveACameraAtRest) {
 TEST(MotionCheck, NoticesAHeadThatReportsOneAngleForEver) {
   Scene scene(wander);
   for (PanTiltSample& sample : scene.samples) sample.pan_rad = sample.tilt_rad = 0.1;
-  EXPECT_THAT(problems(scene.check().findings), ElementsAre(HasSubstr("always the same angles")));
+  EXPECT_THAT(problems(scene.check().findings), ElementsAre(HasSubstr("the angles never change")));
 }
 
 TEST(MotionCheck, NoticesAImageThatStandsStill) {
   Scene scene(wander);
   for (TimedShift& shift : scene.shifts) shift.shift.setZero();
-  EXPECT_THAT(problems(scene.check().findings), ElementsAre(HasSubstr("the picture stands still")));
+  EXPECT_THAT(problems(scene.check().findings),
+              ElementsAre(HasSubstr("the picture does not move")));
 }
 
 TEST(MotionCheck, BearsHardlyAnythingAndNonsense) {

@@ -164,7 +164,7 @@ TEST(TelemetryCheck, SaysThatSamplesAreTooFarApart) {
   std::vector<PanTiltSample> at_rest = every(5);
   for (PanTiltSample& sample : at_rest) sample.pan_rad = 0.1;
   EXPECT_THAT(problems(check(at_rest, needed).findings),
-              ElementsAre(HasSubstr("known is up to 268 ms old (95 %)")));
+              ElementsAre(HasSubstr("angle is up to 268 ms old (95 %)")));
   needed.max_repeat_s = 0.05;
   EXPECT_THAT(check(at_rest, needed).findings, IsEmpty());
   needed = needs();

@@ -165,7 +165,7 @@ TEST(VideoCheck, SaysThatAClockIsNone) {
   for (CheckedFrame& frame : frames)
     frame.stamp.sender_time_s = 0.09 * static_cast<double>(frame.stamp.frame);
   EXPECT_THAT(problems(checked(frames).findings),
-              ElementsAre(HasSubstr("counts 2.25 seconds in each of the host's")));
+              ElementsAre(HasSubstr("runs at 2.25 times the host's")));
 }
 
 // 10 s of a camera that leaves out a share of its pictures, of which its stamps know nothing; of the rest a share is lost.
@@ -262,7 +262,8 @@ TEST(VideoCheck, AdvisesAgainstTimesOfArrivalOnly) {
     frame.stamp.sender_time_s.reset();
     frame.stamp.receive_time_s += frame.stamp.frame % 3 == 0 ? 0.01 : 0;
   }
-  EXPECT_THAT(advice(checked(frames).findings), ElementsAre(HasSubstr("no sender's clock")));
+  EXPECT_THAT(advice(checked(frames).findings),
+              ElementsAre(HasSubstr("without the camera's clock")));
 }
 
 TEST(VideoCheck, BearsHardlyAnything) {

@@ -195,7 +195,7 @@ TEST_F(CalibrateCommand, ScalesALensOfAnotherSizeAndRefusesOneOfAnotherShape) {
   const Result result = calibrate_command({path(), "--json", "--prior", half});
   ASSERT_EQ(result.exit_code, 0) << result.errors;
   EXPECT_THAT(result.errors,
-              HasSubstr("half.yaml: is of images of 960x540 px and is scaled to 1920x1080"));
+              HasSubstr("half.yaml: is for images of 960x540 px and is scaled to 1920x1080"));
   const auto priors = nlohmann::json::parse(result.output)["priors"];
   EXPECT_NEAR(priors["line_delay"]["value"].get<double>(), 1e-6, 1e-12);
   EXPECT_NEAR(priors["focal_length"]["value"].get<double>(), 4000, 1e-3);
@@ -203,7 +203,8 @@ TEST_F(CalibrateCommand, ScalesALensOfAnotherSizeAndRefusesOneOfAnotherShape) {
       directory_.write("square.yaml", lens_file_of(simulation_, 1440, 1080, 1e-9));
   fs::remove_all(path("alidade"));
   const Result refused = calibrate_command({path(), "--prior", square});
-  expect_refused(refused, 2, "is of images of 1440x1080 px, these are 1920x1080, of another shape");
+  expect_refused(refused, 2,
+                 "is for images of 1440x1080 px, but these have 1920x1080 px and another shape");
 }
 
 TEST_F(CalibrateCommand, OptionsGoBeforeTheLensFileAndItIsSaid) {
@@ -213,8 +214,10 @@ TEST_F(CalibrateCommand, OptionsGoBeforeTheLensFileAndItIsSaid) {
   const Result result = calibrate_command(
       {path(), "--json", "--prior", lens, "--line-delay", "1e-6", "--focal-length", "free"});
   ASSERT_EQ(result.exit_code, 0) << result.errors;
-  EXPECT_THAT(result.errors, HasSubstr("--line-delay 1e-6 goes before its line delay"));
-  EXPECT_THAT(result.errors, HasSubstr("--focal-length free goes before its focal length"));
+  EXPECT_THAT(result.errors,
+              HasSubstr("its line delay is not used, as --line-delay 1e-6 is given"));
+  EXPECT_THAT(result.errors,
+              HasSubstr("its focal length is not used, as --focal-length free is given"));
   const auto priors = nlohmann::json::parse(result.output)["priors"];
   EXPECT_EQ(priors["line_delay"]["sigma"], 0);
   EXPECT_FALSE(priors.contains("focal_length"));
@@ -231,7 +234,7 @@ TEST_F(CalibrateCommand, SaysWhichPartOfALensFileContradictsTheRecording) {
   ASSERT_EQ(result.exit_code, 0) << result.errors;
   for (const char* what :
        {"line delay contradicts the recording and is left out: 30.0000 +- 0.0015 us/row is known",
-        "found at another zoom, focal length and distortion do not count here"}) {
+        "focal length and distortion were found at another zoom and are not used"}) {
     EXPECT_THAT(result.errors, HasSubstr(what));
     EXPECT_THAT(directory_.read("alidade/report.html"), HasSubstr(what));
   }

@@ -279,7 +279,7 @@ TEST_F(CalibrateZooms, SaysWhatCannotBeOneCurve) {
     EXPECT_THAT(last_line(result.errors), HasSubstr(why));
     EXPECT_FALSE(fs::exists(output() + "/calibration.yaml"));
   };
-  refused({a, b, "--focal-length", "1500"}, 2, "--focal-length holds at one zoom");
+  refused({a, b, "--focal-length", "1500"}, 2, "--focal-length is valid at one zoom only");
   refused({a, a}, 1,
           "2 of 2 stretches of constant zoom could be calibrated: calibrations at two "
           "zoom readings or more are needed");

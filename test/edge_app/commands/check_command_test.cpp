@@ -253,7 +253,7 @@ TEST_F(CheckCommand, SaysThatTiltIsReversed) {
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_THAT(findings(result.errors),
               ElementsAre(AllOf(HasSubstr(path("recording")), HasSubstr("tilt is reversed"),
-                                HasSubstr("turn the sign of tilt_rad"))));
+                                HasSubstr("invert the sign of tilt_rad"))));
   EXPECT_THAT(result.output, HasSubstr("pan sign correct, tilt sign REVERSED"));
 }
 
@@ -299,7 +299,7 @@ TEST_F(CheckCommand, SaysThatADeviceNeverMeasures) {
   change_telemetry([](std::vector<std::string>* cells) { cells->at(1) = cells->at(2) = "0.1"; });
   const Result result = check();
   EXPECT_EQ(result.exit_code, 1);
-  EXPECT_THAT(findings(result.errors), ElementsAre(HasSubstr("always the same angles")));
+  EXPECT_THAT(findings(result.errors), ElementsAre(HasSubstr("the angles never change")));
 }
 
 TEST_F(CheckCommand, SaysThatTheFocalLengthIsAnother) {

@@ -290,7 +290,7 @@ TEST_F(CommandLineTest, RunWithNothingToBeginWithSaysWhatIsMissing) {
                 "set calibration.file or camera.focal_length_px"},
            Case{size, not_auto, "neither a calibration nor a data sheet is given",
                 "set calibration.file or camera.focal_length_px"},
-           Case{", width: 320", data_sheet, "video.width: stands alone", "give width and height"},
+           Case{", width: 320", data_sheet, "video.width: is given alone", "give width and height"},
        }) {
     const std::string config = live_config(c.size, c.more);
     const Result result = alidade({"run", "-c", config});
@@ -356,11 +356,11 @@ TEST_F(CommandLineTest, CalibrateShutterTakesOneVideo) {
   };
   for (const auto& [arguments, what] :
        {std::pair(std::vector<std::string>{}, "no video; give a recording's directory or a video"),
-        {{"video.mp4", "-c", live}, "video.mp4 and -c are two videos; give a recording or a file"},
+        {{"video.mp4", "-c", live}, "video.mp4 and -c name a video; give a recording or a file"},
         {{"video.mp4", "--duration", "3"}, "--duration is for a live video, with -c"},
         {{"-c", path("none.yaml")}, "none.yaml: cannot be read"},
         {{"-c", recorded_config()},
-         "video.type: a recording is no live video; give its directory"}}) {
+         "video.type: a recording is not live video; give its directory"}}) {
     const Result result = calibrate(arguments);
     EXPECT_EQ(result.exit_code, 2) << what;
     EXPECT_THAT(result.errors, AllOf(StartsWith("alidade: "), HasSubstr(what)));
@@ -460,10 +460,11 @@ TEST_F(CommandLineTest, ReplayWithoutACalibrationNamesBothWaysToOne) {
   head_.record(directory_, 10);
   const Result result = alidade({"replay", directory_.path()});
   EXPECT_EQ(result.exit_code, 2);
-  EXPECT_THAT(last_line(result.errors),
-              AllOf(HasSubstr("has no calibration"),
-                    HasSubstr("`alidade calibrate " + directory_.path() + "`"),
-                    HasSubstr("`alidade run` has stored"), HasSubstr("--calibration FILE")));
+  EXPECT_THAT(
+      last_line(result.errors),
+      AllOf(HasSubstr("has no calibration"),
+            HasSubstr("`alidade calibrate " + directory_.path() + "`"),
+            HasSubstr("calibration.file of `alidade run`"), HasSubstr("--calibration FILE")));
   // What run has stored is one that it takes.
   directory_.write("stored.yaml", head_.calibration());
   EXPECT_EQ(alidade({"replay", directory_.path(), "--calibration", path("stored.yaml")}).exit_code,

@@ -151,7 +151,7 @@ TEST_F(HttpLinks, AreSaidToBeRecordedForLessWhereThePicturesStop) {
   const Result result = alidade(
       {"record", "-c", config(), "-o", directory_.path() + "/recording", "--duration", "1"});
   EXPECT_EQ(result.exit_code, 0) << result.errors;
-  EXPECT_THAT(result.errors, HasSubstr("are stored of the 1 s asked for: video stopped coming"));
+  EXPECT_THAT(result.errors, HasSubstr("are stored of the 1 s asked for, as the video stopped"));
   EXPECT_EQ(read_csv(directory_.read("recording/frames.csv")).size(), 5U);
 }
 

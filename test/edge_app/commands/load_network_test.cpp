@@ -70,8 +70,8 @@ TEST(LoadNetwork, SaysInOneLineWhichFileIsWrongAndWhatWouldBeRight) {
       {network_of(cells("v8"), absent), absent, "No such file"},
       {labels("\n\n"), "labels.txt", "is empty; expected the classes' names, one a line"},
       {labels("a\n\n" + too_long + "\n"), "labels.txt:3",
-       "is no class's name (33 bytes); expected text of at most 32 bytes, without control"},
-      {labels("a\n\tb\n"), "labels.txt:2", "is no class's name"},
+       "is not a class name (33 bytes); expected text of at most 32 bytes, without control"},
+      {labels("a\n\tb\n"), "labels.txt:2", "is not a class name"},
   };
   for (const auto& slip : slips) {
     const std::string line = refusal_of(slip.files);

@@ -110,7 +110,7 @@ TEST_F(PlaneCommand, TakesHeightAndLevelAlsoWithOnePointAndWithoutAny) {
         "y_m: 30, sigma_m: 0.02}]\n"}) {
     const Result result = alidade({"plane", "fit", write(known + points)});
     EXPECT_EQ(result.exit_code, 0) << points << result.errors;
-    EXPECT_THAT(result.output, HasSubstr("nothing says where north is"));
+    EXPECT_THAT(result.output, HasSubstr("the direction of north is not given"));
     EXPECT_TRUE(fs::exists(in_directory("plane.yaml")));
   }
   PlaneEstimate plane;

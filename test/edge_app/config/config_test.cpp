@@ -98,9 +98,9 @@ TEST_F(ConfigTest, WithoutTelemetryTheSceneMapAndACalibrationAreNeeded) {
   ASSERT_THAT(load(none + map + calibrated), IsEmpty());
   EXPECT_EQ(config_.pan_tilt.type, PanTiltConfig::Type::kNone);
   EXPECT_FALSE(config_.calibration.automatic);
-  EXPECT_THAT(load(none + calibrated), HasSubstr(":2: pan_tilt.type: none, and no scene map"));
+  EXPECT_THAT(load(none + calibrated), HasSubstr(":2: pan_tilt.type: none, but no scene map"));
   EXPECT_THAT(load(none + map),
-              HasSubstr(":2: pan_tilt.type: none, and nothing can be calibrated"));
+              HasSubstr(":2: pan_tilt.type: none, but nothing can be calibrated"));
   EXPECT_THAT(load(none + map + "calibration: {file: c.yaml, auto: true}\n"),
               HasSubstr("set it to false"));
   EXPECT_THAT(load(none + map + "calibration: {file: c.yaml, auto: false}\n"), IsEmpty());
@@ -415,7 +415,7 @@ TEST_F(ConfigTest, WidthWithoutHeightIsRefused) {
       "video:\n  type: rtsp\n  url: rtsp://camera/s\n  width: 1280\n"
       "pan_tilt: {type: vapix, url: http://camera}\n"
       "camera: {focal_length_px: 1000}\n");
-  EXPECT_EQ(error, path_ + ":4: video.width: stands alone; give width and height");
+  EXPECT_EQ(error, path_ + ":4: video.width: is given alone; give width and height");
 }
 
 TEST_F(ConfigTest, RecordingAndRtpSourcesAreRead) {
@@ -750,7 +750,7 @@ INSTANTIATE_TEST_SUITE_P(
                 "video: {type: rtsp, url: rtsp://c/s, device: /dev/video0}\n" PAN_TILT,
                 ":1: video.device", "unknown key"},
         Mistake{"DoubledKey", MINIMAL "camera:\n  aspect: 1\n  aspect: 1\n", ":6: camera",
-                "stands twice"},
+                "is given twice"},
         Mistake{"TargetsOnNoPlane", MINIMAL "tracking: {space: plane}\n", ":4: tracking.space",
                 "add plane: plane.yaml"},
         Mistake{"MetresOnTheSphere", MINIMAL "tracking:\n  most_sigma_m: 3\n",
@@ -759,9 +759,9 @@ INSTANTIATE_TEST_SUITE_P(
                 MINIMAL "tracking:\n  plane: p.yaml\n  acceleration_density_rad2_s3: 1\n",
                 ":6: tracking.acceleration_density_rad2_s3", "expected the key with m"},
         Mistake{"MoreHitsThanLooks", MINIMAL "tracking:\n  birth_hits: 6\n",
-                ":5: tracking.birth_hits", "leaves 6 hits of 5 looks"},
+                ":5: tracking.birth_hits", "asks for 6 hits in 5 looks"},
         Mistake{"FewerLooksThanHits", MINIMAL "tracking:\n  birth_looks: 2\n",
-                ":5: tracking.birth_looks", "leaves 3 hits of 2 looks"},
+                ":5: tracking.birth_looks", "asks for 3 hits in 2 looks"},
         Mistake{"NoiselessDetector", MINIMAL "tracking: {detection_sigma_px: 0}\n",
                 ":4: tracking.detection_sigma_px", "px"},
         Mistake{"HistoryBeyondTheRecords", MINIMAL "tracking: {history_s: 10}\n",
@@ -795,7 +795,7 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"BrokerOverHttp", MINIMAL "mqtt: {url: 'http://broker'}\n", ":4: mqtt.url",
                 "starts with mqtt://, mqtts://"},
         Mistake{"BrokerWithAPath", MINIMAL "mqtt: {url: 'mqtt://broker/a'}\n", ":4: mqtt.url",
-                "see mqtt.prefix"},
+                "set the topics by mqtt.prefix"},
         Mistake{"PasswordInTheBrokersUrl", MINIMAL "mqtt: {url: 'mqtt://u:p@broker'}\n",
                 ":4: mqtt.url", "give them as user and password_env"},
         Mistake{"AuthorityWithoutTls", MINIMAL "mqtt: {url: 'mqtt://broker', ca_file: ca.pem}\n",
@@ -808,7 +808,7 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"ServiceBeyondTwo", MINIMAL "mqtt: {url: 'mqtt://broker', qos: 3}\n",
                 ":4: mqtt.qos", "quality of service"},
         Mistake{"PasswordFileForNobody", MINIMAL "mqtt: {url: 'mqtt://broker', password_file: p}\n",
-                ":4: mqtt.password_file", "stands without a user"},
+                ":4: mqtt.password_file", "is given without a user"},
         Mistake{"PasswordFileThatIsNotThere",
                 MINIMAL "mqtt: {url: 'mqtt://broker', user: u, password_file: none}\n",
                 ":4: mqtt.password_file", "put the password there"},
@@ -845,7 +845,7 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"HeadWithoutLine", VIDEO "pan_tilt: {type: pelco_d}\n", ":2: pan_tilt.device",
                 "is missing; expected for example device: /dev/ttyUSB0, or url: tcp://"},
         Mistake{"HeadOnTwoLines", VIDEO "pan_tilt: {type: ptu, device: /dev/x, url: tcp://h:1}\n",
-                ":2: pan_tilt.url", "stands beside device; keep one"},
+                ":2: pan_tilt.url", "and device exclude each other; keep one"},
         Mistake{"HeadWithoutPort", VIDEO "pan_tilt: {type: ptu, url: tcp://head}\n",
                 ":2: pan_tilt.url", "is not an address tcp://host:port or udp://host:port"},
         Mistake{"OddBaud", VIDEO "pan_tilt: {type: pelco_d, device: /dev/x, baud: 9601}\n",
@@ -882,15 +882,16 @@ INSTANTIATE_TEST_SUITE_P(
                 VIDEO
                 "pan_tilt: {type: vapix, url: http://camera,\n  max_repeat_s: 0.25}\n" CALIBRATION,
                 ":3: pan_tilt.max_repeat_s",
-                "is 0.25 s, no less than realtime.max_extrapolation_s (0.25 s), so that a head at "
-                "rest has no angle that is new enough; expected less than 0.25, or "
+                "is 0.25 s, no less than realtime.max_extrapolation_s (0.25 s), so a head at rest "
+                "never has an angle that is new enough; expected less than 0.25, or "
                 "realtime.max_extrapolation_s more than 0.25"},
-        Mistake{
-            "ExtrapolationShorterThanRepeats", MINIMAL "realtime: {max_extrapolation_s: 0.05}\n",
-            ":4: realtime.max_extrapolation_s",
-            "is 0.05 s, no more than pan_tilt.max_repeat_s (0.1 s), so that a head at rest has "
-            "no angle that is new enough; expected more than 0.1, or pan_tilt.max_repeat_s less "
-            "than 0.05"},
+        Mistake{"ExtrapolationShorterThanRepeats",
+                MINIMAL "realtime: {max_extrapolation_s: 0.05}\n",
+                ":4: realtime.max_extrapolation_s",
+                "is 0.05 s, no more than pan_tilt.max_repeat_s (0.1 s), so a head at rest never "
+                "has an angle that is new enough; expected more than 0.1, or pan_tilt.max_repeat_s "
+                "less "
+                "than 0.05"},
         Mistake{"NoExtrapolationAndRepeats", MINIMAL "realtime: {max_extrapolation_s: 0}\n",
                 ":4: realtime.max_extrapolation_s",
                 "expected more than 0.1, or pan_tilt.max_repeat_s 0"},
@@ -907,7 +908,7 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"HttpUrl", MINIMAL "output: {http: 'http://127.0.0.1:8080/'}\n", ":4: output.http",
                 "is not ADDRESS:PORT"},
         Mistake{"TokenWithoutHttp", MINIMAL "output: {token_env: HOME}\n", ":4: output.token_env",
-                "stands without http"},
+                "is given without http"},
         Mistake{"TwoTokens",
                 MINIMAL "output: {http: '127.0.0.1:0', token_env: HOME, token_file: t}\n",
                 ":4: output.token_file", "keep one"},
@@ -922,7 +923,7 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"NoTokensFile", MINIMAL "output: {http: '127.0.0.1:0', tokens_file: nowhere}\n",
                 ":4: output.tokens_file", "nowhere: cannot be read: No such file"},
         Mistake{"TlsWithoutHttp", MINIMAL "output: {tls: {certificate: c, key: k}}\n",
-                ":4: output.tls", "stands without http; add http"},
+                ":4: output.tls", "is given without http; add http"},
         Mistake{"TlsWithoutKey", MINIMAL "output: {http: '127.0.0.1:0', tls: {certificate: c}}\n",
                 ":4: output.tls.key", "is missing"},
         Mistake{"TlsOfADevice",

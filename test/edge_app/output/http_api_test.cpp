@@ -410,7 +410,7 @@ TEST_F(HttpApiWithTargetsTest, RefusesEachKindOfBadDetectionsWithItsReason) {
   } refusals[] = {
       {"not JSON", "400", "must be a JSON object"},
       {R"({"frame": 1, "boxes": [{"u": NaN, "v": 1, "width": 1, "height": 1}]})", "400",
-       "object; NaN is no number of JSON"},
+       "object; NaN is not a JSON number"},
       {R"({"frame": 1, "boxes": [{"u": 1e999, "v": 1, "width": 1, "height": 1}]})", "400",
        "object"},
       {R"({"boxes": []})", "400", "frame or time_s is missing"},

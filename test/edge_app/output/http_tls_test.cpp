@@ -322,7 +322,8 @@ TEST_F(HttpTokensTest, AreReadAnewOnceTheirFileHasChanged) {
   EXPECT_EQ(tokens.right_of("Bearer new-horse", 12), HttpRight::kView);
   EXPECT_EQ(tokens.right_of("Bearer other-horse", 12), HttpRight::kControl);
   directory_.write("tokens", "control short\n");
-  EXPECT_EQ(tokens.right_of("Bearer new-horse", 14), HttpRight::kView) << "those of before go on";
+  EXPECT_EQ(tokens.right_of("Bearer new-horse", 14), HttpRight::kView)
+      << "the earlier tokens stay in use";
   directory_.write("tokens", "view last-horse-of-all\n");
   EXPECT_EQ(tokens.right_of("Bearer last-horse-of-all", 14.5), std::nullopt) << "once a second";
   EXPECT_EQ(tokens.right_of("Bearer last-horse-of-all", 16), HttpRight::kView);
@@ -356,7 +357,7 @@ TEST(ParseTokens, SaysWhichLineIsWrongAndNoToken) {
   EXPECT_THAT(error("view only-hors\xc3\xa9\n"), StartsWith("line 1 has no token of at least 8"));
   EXPECT_THAT(error("view only-horse and more\n"), StartsWith("line 1 has more than"));
   EXPECT_THAT(error("view only-horse\ncontrol only-horse\n"),
-              StartsWith("line 2 has a token that"));
+              StartsWith("line 2 repeats an earlier token"));
 }
 
 }  // namespace

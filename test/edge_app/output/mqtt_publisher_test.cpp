@@ -349,12 +349,12 @@ INSTANTIATE_TEST_SUITE_P(
     ::testing::Values(BadBroker{"APublisher",
                                 std::string(kTaken, 4) +
                                     std::string("\x30\xff\xff\xff\x7f\0\1x", 8),
-                                "what comes is no answer that a broker gives"},
+                                "the answer is not one that a broker gives"},
                       BadBroker{"ALongAnswer", std::string(kTaken, 4) + "\x40\xff\xff\xff\x7f",
-                                "what comes is no answer that a broker gives"},
+                                "the answer is not one that a broker gives"},
                       BadBroker{"AWebServer", "HTTP/1.1 400 Bad Request\r\n\r\n",
-                                "what comes is no answer that a broker gives"},
-                      BadBroker{"HalfAnAnswer", "\x20\x02", "half an answer has come"}),
+                                "the answer is not one that a broker gives"},
+                      BadBroker{"HalfAnAnswer", "\x20\x02", "only half of an answer has come"}),
     [](const auto& which) { return which.param.name; });
 
 TEST_P(MqttConnectionTo, IsEnded) {

@@ -90,7 +90,7 @@ TEST(LensFile, RefusesEverySlipInOneLine) {
   refused(replaced(good, "format: 1", "format: 2"), "format 2 is not known");
   refused(replaced(good, "format: 1\n", ""), "format is missing");
   refused(good + "k3: {value: 0, sigma: 0}\n", "unknown key k3; known are format");
-  refused(good + "k1: {value: 0, sigma: 0}\n", "k1 stands here a second time");
+  refused(good + "k1: {value: 0, sigma: 0}\n", "k1 is given twice");
   refused(with_line_of("p2", ""), "p2 is missing; add it");
   refused(with_line_of("line_delay", ""), "line_delay is missing");
   refused(with_line_of("k1", "k1: {value: nan, sigma: 0}"), "lens.yaml:7: k1 is \"nan\"");
@@ -101,7 +101,8 @@ TEST(LensFile, RefusesEverySlipInOneLine) {
   refused(with_line_of("k1", "k1: {value: 0, sigma: -1e-4}"), "k1.sigma is -0.0001");
   refused(with_line_of("k1", "k1: {value: 0, sigma: inf}"), "k1.sigma is \"inf\"");
   refused(with_line_of("k1", "k1: {value: 0, sigma: 1, unit: 1}"), "unknown key k1.unit");
-  refused(with_line_of("k1", "k1: {value: 0, sigma: 1}"), "sigma of k1 is 1, its covariance says");
+  refused(with_line_of("k1", "k1: {value: 0, sigma: 1}"),
+          "sigma of k1 is 1, but by its covariance it is");
   refused(with_line_of("line_delay", "line_delay: {value: 51.56, sigma: 0.06}"),
           "give seconds a row; 14 microseconds are 14e-6");
   refused(with_line_of("focal_length_u", "focal_length_u: {value: 4.3, sigma: 0.03}"),

@@ -92,7 +92,7 @@ INSTANTIATE_TEST_SUITE_P(
                       ToldClock{"AndBehind", 0, -kTenHours_s, -kTenHours_s, 1,
                                 "a UTC 600 min behind this host's"},
                       ToldClock{"ItsLocalTimeHeldAgainst", kTenHours_s, -kTenHours_s, 1e-9, 1,
-                                "takes logins by its local time alone"},
+                                "accepts logins by its local time only"},
                       ToldClock{"AFalseClockHeldAgainst", -kTenHours_s, 0, 0, 0, ""},
                       ToldClock{"ATrueOne", 0, 0, 0, 0, ""}),
     [](const auto& tested) { return std::string(tested.param.name); });
@@ -130,11 +130,12 @@ TEST(OnvifOtherDevices, AWrongPasswordIsTriedByEachClockOnceAndThenBlamed) {
   const auto source = open_onvif(options);
   PanTiltSample sample;
   ASSERT_EQ(read_until(*source, sample, ReadStatus::kFailed), ReadStatus::kFailed);
-  EXPECT_THAT(source->error(),
-              AllOf(StartsWith(server.url() + "/: wrong user or password"),
-                    HasSubstr("; tried by the clock that it tells (600 min ahead of this host's), "
-                              "this host's clock"),
-                    Not(HasSubstr("guess"))));
+  EXPECT_THAT(
+      source->error(),
+      AllOf(StartsWith(server.url() + "/: wrong user or password"),
+            HasSubstr("; tried by the clock that it reports (600 min ahead of this host's), "
+                      "this host's clock"),
+            Not(HasSubstr("guess"))));
   EXPECT_EQ(server.wrong_logins, 2);
 }
 
@@ -217,8 +218,8 @@ TEST(OnvifLoginWays, TakeALocalTimeForNoUtc) {
   EXPECT_TRUE(ways.refused(false));
   ways.accepted();
   EXPECT_EQ(ways.note(),
-            "the device tells a local time and no UTC, but takes logins by this host's clock "
-            "alone; logins go by that");
+            "the device reports a local time and no UTC, but accepts logins by this host's clock "
+            "only; that clock is used for logins");
 }
 
 // Of a device in use each pause brings one login: first that which was good.
@@ -544,7 +545,7 @@ TEST(OnvifScale, TakesADeclaredRangeForWhatItCanBeAlone) {
   turned.set_ranges({{"", OnvifInterval{360, 0}, OnvifInterval{0, 180}}});
   EXPECT_EQ(scaled(turned, at(50, 50)).outcome, OnvifScale::Outcome::kOutside);
   EXPECT_THAT(turned.note(at(50, 50)),
-              HasSubstr("declares pan 360..0 and tilt 0..180, which is no range"));
+              HasSubstr("declares pan 360..0 and tilt 0..180, which is not a range"));
 }
 
 }  // namespace

@@ -264,11 +264,11 @@ TEST_P(ViscaNumbers, OfAnswersMayBeAnyAndThatIsSaidOnce) {
   EXPECT_EQ(notes, GetParam() == Numbers::kOfTheQuery ? ""
                    : GetParam() == Numbers::kNoHeader
                        ? server.address() +
-                             ": the device's answers have no right VISCA header; the order in "
-                             "which they come counts instead\n"
+                             ": the device's answers have no valid VISCA header; they are "
+                             "matched by their order instead\n"
                        : server.address() +
-                             ": the device's answers do not bear the sequence numbers of their "
-                             "queries; the order in which they come counts instead\n");
+                             ": the device's answers do not have the sequence numbers of their "
+                             "queries; they are matched by their order instead\n");
 }
 
 // As a camera that answers queries of the numbers 1 to 3 alone, each with a 1.

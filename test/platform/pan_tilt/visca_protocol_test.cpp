@@ -392,7 +392,7 @@ TEST_F(ViscaWithHeader, CountsOnTheOrderOfAnswersWhereNumbersAreNoQuerys) {
   EXPECT_EQ(protocol_->next().bytes, datagram(0x0110, 4, "\x81\x09\x06\x12\xFF"));
   EXPECT_EQ(protocol_->find(datagram(0x0111, 1, kZoomAnswer)).kind, Answer::Kind::kNone);
   EXPECT_EQ(protocol_->find(datagram(0x0111, 1, kEleven)).kind, Answer::Kind::kPanTilt);
-  EXPECT_THAT(protocol_->peculiarity(), HasSubstr("do not bear the sequence numbers"));
+  EXPECT_THAT(protocol_->peculiarity(), HasSubstr("do not have the sequence numbers"));
   // As without a header: a fence where bytes came too many.
   protocol_->doubt();
   EXPECT_EQ(protocol_->next().bytes, datagram(0x0110, 5, kZoomQuery));

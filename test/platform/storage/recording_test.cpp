@@ -153,7 +153,7 @@ INSTANTIATE_TEST_SUITE_P(
         Flaw{"NegativeFrame", "frame,receive_time_s\n-1,1\n", 2, "negative frame"},
         Flaw{"ShortRow", "frame,receive_time_s\n0,1\n\n1\n", 4, "fewer cells"},
         Flaw{"MissingColumn", "frame,time\n0,1\n", 1, "no column 'receive_time_s'"},
-        Flaw{"RepeatedColumn", "frame,frame,receive_time_s\n", 1, "column 'frame' stands twice"},
+        Flaw{"RepeatedColumn", "frame,frame,receive_time_s\n", 1, "column 'frame' is given twice"},
         Flaw{"Empty", "", 1, "no header line"}),
     [](const auto& flaw) { return flaw.param.name; });
 

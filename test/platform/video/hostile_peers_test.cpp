@@ -312,9 +312,10 @@ TEST(RtspByUdp, SaysWhoSendsWhereTheCameraDoesNot) {
   const auto source = open_rtp(options);
   Frame frame;
   ASSERT_EQ(read_until(*source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
-  EXPECT_THAT(source->error(),
-              AllOf(HasSubstr("nothing received for 0.5 s"),
-                    HasSubstr("what comes is of another address (127.0.0.2 in place of")));
+  EXPECT_THAT(
+      source->error(),
+      AllOf(HasSubstr("nothing received for 0.5 s"),
+            HasSubstr("the packets that come are of another address (127.0.0.2 in place of")));
 }
 
 // Which of two has the filter: of the video, or of the session.

@@ -333,7 +333,7 @@ TEST(MjpegSource, GivesUpAStreamOfPartsThatAreNoPictures) {
   const auto source = open_mjpeg(options_for(server));
   Frame frame;
   EXPECT_EQ(read_until(*source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
-  EXPECT_THAT(source->error(), HasSubstr("more than 1000 parts in a row are no pictures"));
+  EXPECT_THAT(source->error(), HasSubstr("more than 1000 parts in a row are not pictures"));
 }
 
 TEST(MjpegSource, TakesAPictureThatComesInTinyPieces) {

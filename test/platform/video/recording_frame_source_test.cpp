@@ -106,7 +106,7 @@ TEST(RecordingFrameSource, RemarksOnBFramesAndOnNothingElse) {
   write_video(recording.directory.path() + "/video.mkv", 32, 16, 20, 3);
   EXPECT_THAT(remarks_of(recording),
               ElementsAre(AllOf(HasSubstr(recording.directory.path() + "/video.mkv has B-frames"),
-                                HasSubstr("row k of frames.csv has to be"))));
+                                HasSubstr("row k of frames.csv must belong to"))));
 }
 
 TEST(RecordingFrameSource, RefusesRowsInTheOrderOfPacketsBesideBFrames) {
@@ -208,7 +208,7 @@ TEST(RecordingFrameSource, SaysWhatIsMissing) {
   const Recording recording(2);
   EXPECT_THAT(recording.error(), HasSubstr("no pictures; a recording holds video.mkv, frames/ or"));
   recording.directory.write("frames/000000.pgm", picture_file("pgm", 32, 16, 0));
-  EXPECT_THAT(recording.error(), HasSubstr("frames/000001: no such picture"));
+  EXPECT_THAT(recording.error(), HasSubstr("frames/000001: frames.csv has a row for this picture"));
   recording.directory.write("frames.csv", "frame,receive_time_s\n0,zero\n");
   EXPECT_THAT(recording.error(), HasSubstr("frames.csv:2: 'zero'"));
   std::filesystem::remove(recording.directory.path() + "/recording.yaml");

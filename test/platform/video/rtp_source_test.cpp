@@ -453,7 +453,8 @@ TEST_P(RtpSourceBeside, ForeignPacketsEveryPictureComesWhole) {
   }
   EXPECT_EQ(source->counters().damaged, 0);
   EXPECT_GE(source->counters().foreign_packets, 29);
-  EXPECT_THAT(source->remark(), HasSubstr("come among the video's; the session has not agreed"));
+  EXPECT_THAT(source->remark(),
+              HasSubstr("come between those of the video; the session did not announce"));
   EXPECT_EQ(source->remark(), "") << "said once";
 }
 

@@ -156,7 +156,7 @@ class VirtualMachine(unittest.TestCase):
     def test_check_tells_what_the_camera_sends(self):
         # The driver's picture does not turn with the head, which is what check says.
         output, errors = self.step("check", exit_code=1)
-        self.assertIn("the picture stands still, while the head turned", errors)
+        self.assertIn("the picture does not move, although the head turned", errors)
         self.assertRegex(output, rf"video +/dev/video10: {WIDTH}x{HEIGHT} px .*sequence numbers")
         self.assertRegex(output, r"pan/tilt +/run/head: pan ")
 
