@@ -11,7 +11,7 @@
 namespace alidade::test {
 namespace {
 
-constexpr double kFrame_s = 0.04;
+constexpr double kToldFrame_s = 0.04;
 constexpr double kReadOut_s = 0.01;
 constexpr double kWide = 1000;  // px, at reading 0
 constexpr double kTele = 4000;  // px, at reading 100
@@ -47,7 +47,7 @@ class ToldLens : public testing::Test {
  protected:
   // A frame beside a reading; the focal length told for it.
   double frame(double reading) {
-    time_s_ += kFrame_s;
+    time_s_ += kToldFrame_s;
     if (readings_.take(time_s_, reading)) changes_ += 1;
     readings_.place(time_s_);
     lens_.begin_frame(time_s_);
@@ -93,7 +93,7 @@ TEST_F(ToldLens, IsCarriedOnAtItsRate) {
   frame(50);
   constexpr double kRate = 0.5;  // 1/s
   show(focal_length_at(60), kRate);
-  EXPECT_NEAR(std::log(frame(50) / focal_length_at(60)), kRate * kFrame_s, 1e-3);
+  EXPECT_NEAR(std::log(frame(50) / focal_length_at(60)), kRate * kToldFrame_s, 1e-3);
 }
 
 TEST_F(ToldLens, DoesNotFollowAReadingThatJumps) {
@@ -106,7 +106,7 @@ TEST_F(ToldLens, DoesNotFollowAReadingThatJumps) {
 TEST_F(ToldLens, IsTheReadingsAgainOnceLandmarksAreTooLongAgo) {
   frame(50);
   show(focal_length_at(60));
-  const int frames = static_cast<int>(ReadingBeliefOptions().longest_s / kFrame_s) + 2;
+  const int frames = static_cast<int>(ReadingBeliefOptions().longest_s / kToldFrame_s) + 2;
   double told = 0;
   for (int i = 0; i < frames; ++i) told = frame(50);
   EXPECT_NEAR(told / focal_length_at(50), 1, 1e-3);

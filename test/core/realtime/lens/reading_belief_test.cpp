@@ -11,7 +11,7 @@ namespace {
 
 constexpr ReadingBeliefOptions kLimits;
 constexpr double kSigma = 1e-3;  // of log f
-constexpr double kFrame_s = 0.04;
+constexpr double kJudgedFrame_s = 0.04;
 
 TEST(ReadingJudge, BelievesWhatNothingSpeaksAgainst) {
   ReadingJudge judge(kLimits);
@@ -37,11 +37,11 @@ TEST(ReadingJudge, ExcludesWhatLandmarksContradictUntilTheyAgreeOrAreTooOld) {
 
 TEST(ReadingJudge, SeesAReadingJumpThatMovesFasterThanAnyLens) {
   const ReadingJudge judge(kLimits);
-  const double most = kLimits.fastest * kFrame_s + kLimits.excluded_sigmas * kSigma;
-  EXPECT_EQ(judge.belief(kFrame_s, 0.99 * most, kSigma), ReadingBelief::kBelieved);
-  EXPECT_EQ(judge.belief(kFrame_s, -0.99 * most, kSigma), ReadingBelief::kBelieved);
-  EXPECT_EQ(judge.belief(kFrame_s, 1.01 * most, kSigma), ReadingBelief::kJumped);
-  EXPECT_EQ(judge.belief(-kFrame_s, -1.01 * most, kSigma), ReadingBelief::kJumped);
+  const double most = kLimits.fastest * kJudgedFrame_s + kLimits.excluded_sigmas * kSigma;
+  EXPECT_EQ(judge.belief(kJudgedFrame_s, 0.99 * most, kSigma), ReadingBelief::kBelieved);
+  EXPECT_EQ(judge.belief(kJudgedFrame_s, -0.99 * most, kSigma), ReadingBelief::kBelieved);
+  EXPECT_EQ(judge.belief(kJudgedFrame_s, 1.01 * most, kSigma), ReadingBelief::kJumped);
+  EXPECT_EQ(judge.belief(-kJudgedFrame_s, -1.01 * most, kSigma), ReadingBelief::kJumped);
   EXPECT_EQ(judge.belief(kLimits.longest_s, 9, kSigma), ReadingBelief::kBelieved);
   // A reading that says nothing does not excuse every jump.
   const double largest = kLimits.excluded_sigmas * kLimits.largest_sigma;
@@ -51,7 +51,7 @@ TEST(ReadingJudge, SeesAReadingJumpThatMovesFasterThanAnyLens) {
 TEST(ReadingJudge, CallsAnExcludedReadingExcludedThoughItJumps) {
   ReadingJudge judge(kLimits);
   judge.judge(1, kSigma);
-  EXPECT_EQ(judge.belief(kFrame_s, 9, kSigma), ReadingBelief::kExcluded);
+  EXPECT_EQ(judge.belief(kJudgedFrame_s, 9, kSigma), ReadingBelief::kExcluded);
 }
 
 TEST(ReadingBeliefOptions, NameWhatIsNotValid) {
