@@ -27,12 +27,13 @@ struct NamedValues {
 template <std::size_t kCount>
 using NamedValuesOf = NamedValues<static_cast<int>(kCount)>;
 
-// range_of(i): of the plausible values. unit: of the values, in errors. what: completes "some of
-// the ...".
-template <std::size_t kCount, class RangeOf>
+// range_of(i): of the plausible values. check(value) may refuse the values; it is called before the
+// covariance is read, so that a wrong unit is named first. unit: of the values, in errors. what:
+// completes "some of the ...".
+template <std::size_t kCount, class RangeOf, class Check>
 [[nodiscard]] NamedValuesOf<kCount> read_named_values(const EstimateReader& file,
                                                       const std::array<const char*, kCount>& names,
-                                                      const RangeOf& range_of,
+                                                      const RangeOf& range_of, const Check& check,
                                                       const std::string& unit,
                                                       const std::string& what) {
   NamedValuesOf<kCount> out;
@@ -53,6 +54,7 @@ template <std::size_t kCount, class RangeOf>
                            "; one standard deviation, in the unit of the value, is needed");
     }
   }
+  check(out.value);
   const YAML::Node covariance = file.required(file.root(), "covariance", "");
   file.read_covariance(covariance, rows, out.covariance);
   if (covariance["names"].size() != kCount) {

@@ -42,13 +42,16 @@ class LensReader {
       file_.fail(file_.root()["image"],
                  "image is larger than " + std::to_string(kMostPictureSide) + " px");
     }
-    const NamedValues<kLensParameterCount> values = read_named_values(
-        file_, kLensParameterNames,
-        [](std::size_t i) { return plausible_range(static_cast<LensParameter>(i)); },
-        "the unit of the value", "parameters");
-    estimate.lens = values.value;
-    estimate.covariance = values.covariance;
-    check_plausible(estimate);
+    const auto check = [&](const LensVector& value) {
+      estimate.lens = value;
+      check_plausible(estimate);
+    };
+    estimate.covariance =
+        read_named_values(
+            file_, kLensParameterNames,
+            [](std::size_t i) { return plausible_range(static_cast<LensParameter>(i)); }, check,
+            "the unit of the value", "parameters")
+            .covariance;
     const YAML::Node& root = file_.root();
     if (root["quality"] && !root["quality"].IsMap()) {
       file_.fail(root["quality"], "quality is not a map; write `quality: {name: value, ...}`");

@@ -40,8 +40,8 @@ class PlaneReader {
     const YAML::Node& root = file_.root();
     PlaneEstimate estimate;
     if (root["origin"]) estimate.origin = read_origin(root["origin"]);
-    const auto [value, cov] =
-        read_named_values(file_, kPlaneValueNames, plausible_plane_range, "rad or m", "values");
+    const auto [value, cov] = read_named_values(
+        file_, kPlaneValueNames, plausible_plane_range, [](const auto&) {}, "rad or m", "values");
     if (root["quality"] && !root["quality"].IsMap()) {
       file_.fail(root["quality"], "quality is not a map; write `quality: {name: value, ...}`");
     }
