@@ -31,6 +31,8 @@ std::optional<CodedBy> coded_by(AVCodecID codec) {
 bool LumaDecoder::open(const AVCodecParameters& parameters, bool low_delay,
                        std::int64_t max_pixels) {
   context_.reset();
+  budget_ = std::make_unique<PictureBudget>();
+  keeps_too_many_ = false;
   jpeg_.reset();
   decoded_.reset();
   coded_by_ = coded_by(parameters.codec_id);
@@ -67,6 +69,7 @@ bool LumaDecoder::open(const AVCodecParameters& parameters, bool low_delay,
       context_->flags |= AV_CODEC_FLAG_LOW_DELAY;
       context_->has_b_frames = 0;
     }
+    if (low_delay && coded_by_) budget_->bound(context_.get());
     if (codec->id == AV_CODEC_ID_MJPEG) {
       // Otherwise a cut-off picture passes as complete.
       context_->err_recognition |= AV_EF_EXPLODE;
@@ -127,7 +130,14 @@ bool LumaDecoder::send(const AVPacket* packet) {
   if (packet == nullptr) return avcodec_send_packet(context_.get(), nullptr) >= 0;
   if (coded_by_ && !begun_) begin(*packet);
   const PacketPtr changed = in_decoding_order(*packet);
-  return avcodec_send_packet(context_.get(), changed ? changed.get() : packet) >= 0;
+  const bool taken = avcodec_send_packet(context_.get(), changed ? changed.get() : packet) >= 0;
+  if (budget_->take_refusal()) {
+    keeps_too_many_ = true;
+    error_ =
+        "the stream keeps more reference pictures than a camera of this picture size needs; set "
+        "fewer reference frames in the camera";
+  }
+  return taken && !keeps_too_many_;
 }
 
 FramePtr LumaDecoder::as_grey(const AVFrame& frame) {
@@ -167,6 +177,7 @@ LumaDecoder::Result LumaDecoder::receive(Picture* picture) {
   if (code < 0 || frame->decode_error_flags != 0 || (frame->flags & AV_FRAME_FLAG_CORRUPT) != 0) {
     return Result::kDamaged;
   }
+  budget_->give_out(frame.get());
   if (not_right_ > 0) {
     --not_right_;
     return receive(picture);

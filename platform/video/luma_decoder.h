@@ -18,6 +18,7 @@
 #include "platform/video/coded_picture.h"
 #include "platform/video/jpeg_decoder.h"
 #include "platform/video/picture.h"
+#include "platform/video/picture_budget.h"
 
 namespace alidade {
 
@@ -34,12 +35,14 @@ class LumaDecoder {
   };
 
   // low_delay: never hold back a picture for reordering, whatever the stream's parameter sets
-  // permit; H.264 and H.265 data must be Annex B then. A picture of more than max_pixels, counted
+  // permit, and bound the pictures that it keeps (PictureBudget); H.264 and H.265 data must be Annex
+  // B then. A picture of more than max_pixels, counted
   // in whole blocks, cannot be decoded.
   [[nodiscard]] bool open(const AVCodecParameters& parameters, bool low_delay,
                           std::int64_t max_pixels = kMostFilePixels);
 
-  // Takes one whole picture, or null for the end of the stream. False: the data cannot be decoded.
+  // Takes one whole picture, or null for the end of the stream. False: the data cannot be decoded;
+  // for good, if keeps_too_many().
   [[nodiscard]] bool send(const AVPacket* packet);
 
   // Returns the next decoded picture; call it until kNone.
@@ -51,7 +54,10 @@ class LumaDecoder {
   // H.264 and H.265: no picture was returned since open() or flush().
   [[nodiscard]] bool is_beginning() const { return beginning_; }
 
-  // One line; valid after open() failed and after kUnsupported.
+  // The stream keeps more reference pictures than the decoder may; see error().
+  [[nodiscard]] bool keeps_too_many() const { return keeps_too_many_; }
+
+  // One line; valid after open() failed, kUnsupported and keeps_too_many().
   [[nodiscard]] const std::string& error() const { return error_; }
 
  private:
@@ -60,12 +66,14 @@ class LumaDecoder {
   [[nodiscard]] PacketPtr in_decoding_order(const AVPacket& packet) const;
   void begin(const AVPacket& packet);
 
-  CodecContextPtr context_;          // null if jpeg_ is used
-  std::optional<JpegDecoder> jpeg_;  // decodes in send()
-  std::optional<Picture> decoded_;   // the picture from jpeg_, until receive()
-  ScalerPtr scaler_;                 // created for the first picture that needs it
+  std::unique_ptr<PictureBudget> budget_;  // of context_
+  CodecContextPtr context_;                // null if jpeg_ is used
+  std::optional<JpegDecoder> jpeg_;        // decodes in send()
+  std::optional<Picture> decoded_;         // the picture from jpeg_, until receive()
+  ScalerPtr scaler_;                       // created for the first picture that needs it
   std::optional<CodedBy> coded_by_;
   bool low_delay_ = false;
+  bool keeps_too_many_ = false;
   bool beginning_ = false;
   bool begun_ = false;  // a picture was sent since open() or flush()
   int not_right_ = 0;   // pictures still to come before the first right one

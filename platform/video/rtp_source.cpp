@@ -374,6 +374,7 @@ void RtpSource::spoil() {
 ReadStatus RtpSource::decode(AccessUnit* unit, Picture* picture) {
   const bool others_need_it = coded_by(parameters_->codec_id).has_value();
   bool damaged = !decoder_.send(unit->packet.get());
+  if (decoder_.keeps_too_many()) return fail_or_refuse(decoder_.error());
   LumaDecoder::Result result = LumaDecoder::Result::kNone;
   if (!damaged) {
     in_decoder_.push_back(std::move(*unit));

@@ -6,12 +6,10 @@ extern "C" {
 
 #include <cstring>
 #include <stdexcept>
+#include <string>
 
 namespace alidade {
 namespace {
-
-constexpr int kWidth = 160;
-constexpr int kHeight = 128;
 
 void require_coding(int code) {
   if (code < 0) throw std::runtime_error(av_error_text(code));
@@ -21,8 +19,9 @@ CodecContextPtr make_encoder(const CodedStreamOptions& options) {
   const bool h265 = options.codec == CodedBy::kH265;
   const AVCodec* codec = avcodec_find_encoder_by_name(h265 ? "libx265" : "libx264");
   CodecContextPtr encoder(avcodec_alloc_context3(codec));
-  encoder->width = kWidth;
-  encoder->height = kHeight;
+  encoder->width = options.width;
+  encoder->height = options.height;
+  if (options.references > 0) encoder->refs = options.references;
   encoder->time_base = {1, 30};
   encoder->gop_size = options.key_every;
   encoder->max_b_frames = options.allowed_to_overtake;
@@ -36,6 +35,7 @@ CodecContextPtr make_encoder(const CodedStreamOptions& options) {
   if (options.allowed_to_overtake == 0) av_opt_set(encoder->priv_data, "tune", "zerolatency", 0);
   if (h265) {
     std::string text = "log-level=none:open-gop=0:scenecut=0:pools=none:frame-threads=1";
+    if (options.references > 0) text += ":ref=" + std::to_string(options.references);
     if (options.sets_in_band) text += ":repeat-headers=1";
     if (options.allowed_to_overtake > 0) text += ":b-adapt=0:rc-lookahead=5";
     av_opt_set(encoder->priv_data, "x265-params", text.c_str(), 0);
@@ -50,9 +50,9 @@ CodecContextPtr make_encoder(const CodedStreamOptions& options) {
 void paint(AVFrame* picture, int number) {
   require_coding(av_frame_make_writable(picture));
   for (int plane = 0; plane < 3; ++plane) {
-    const int rows = plane == 0 ? kHeight : kHeight / 2;
+    const int rows = plane == 0 ? picture->height : picture->height / 2;
     for (int v = 0; v < rows; ++v) {
-      for (int u = 0; u < (plane == 0 ? kWidth : kWidth / 2); ++u) {
+      for (int u = 0; u < (plane == 0 ? picture->width : picture->width / 2); ++u) {
         picture->data[plane][v * picture->linesize[plane] + u] =
             static_cast<std::uint8_t>(plane == 0 ? 40 + ((u + 3 * number) * 5 + v) % 160 : 128);
       }
@@ -68,8 +68,8 @@ CodedStream coded_stream(const CodedStreamOptions& options) {
   stream.parameters.reset(avcodec_parameters_alloc());
   require_coding(avcodec_parameters_from_context(stream.parameters.get(), encoder.get()));
   const FramePtr picture(av_frame_alloc());
-  picture->width = kWidth;
-  picture->height = kHeight;
+  picture->width = options.width;
+  picture->height = options.height;
   picture->format = encoder->pix_fmt;
   picture->interlaced_frame = options.interlaced ? 1 : 0;
   require_coding(av_frame_get_buffer(picture.get(), 0));

@@ -15,7 +15,10 @@ struct CodedStreamOptions {
   int key_every = 10;
   int allowed_to_overtake = 0;  // so many pictures by the parameter sets; none does
   bool interlaced = false;      // H.264
-  bool sets_in_band = true;     // parameter sets; else in the parameters only
+  int width = 160;
+  int height = 128;
+  int references = 0;        // pictures that a decoder is to keep; 0: the encoder's choice
+  bool sets_in_band = true;  // parameter sets; else in the parameters only
 };
 
 struct CodedStream {
@@ -23,7 +26,7 @@ struct CodedStream {
   std::vector<std::string> pictures;  // Annex B, in the order of decoding
 };
 
-// 160x128 px. Throws where libavcodec cannot.
+// Throws where libavcodec cannot.
 CodedStream coded_stream(const CodedStreamOptions& options);
 
 }  // namespace alidade

@@ -5,7 +5,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <string>
 #include <tuple>
+#include <vector>
 
 #include "test/platform/support/coded_stream.h"
 
@@ -46,6 +48,31 @@ TEST_P(LumaDecoderDelay, IsNoneWhateverTheParameterSetsAllowFor) {
     EXPECT_FALSE(decoder.is_beginning());
     EXPECT_EQ(decoder.receive(&picture), LumaDecoder::Result::kNone) << i;
   }
+}
+
+// Pictures of 14 MB: what a camera keeps, and what a peer may claim.
+class LumaDecoderReferences : public ::testing::TestWithParam<int> {};
+INSTANTIATE_TEST_SUITE_P(, LumaDecoderReferences, ::testing::Values(1, 3, 16));
+
+TEST_P(LumaDecoderReferences, AreBoundedByTheirMemory) {
+  CodedStreamOptions options;
+  options.width = 4096;
+  options.height = 2304;
+  options.pictures = 8;
+  options.key_every = 100;
+  options.references = GetParam();
+  const CodedStream stream = coded_stream(options);
+  LumaDecoder decoder;
+  ASSERT_TRUE(decoder.open(*stream.parameters, true)) << decoder.error();
+  std::vector<Picture> given;  // whoever has them keeps them
+  for (std::size_t i = 0; i < stream.pictures.size(); ++i) {
+    if (!decoder.send(packet_of(stream.pictures[i], static_cast<std::int64_t>(i)).get())) break;
+    ASSERT_EQ(decoder.receive(&given.emplace_back()), LumaDecoder::Result::kPicture) << i;
+  }
+  const bool too_many = GetParam() > 4;
+  EXPECT_EQ(decoder.keeps_too_many(), too_many);
+  EXPECT_EQ(given.size(), too_many ? 5U : stream.pictures.size());
+  if (too_many) EXPECT_EQ(decoder.error().find("the stream keeps more reference pictures"), 0U);
 }
 
 TEST(LumaDecoder, TellsInterlacedCoding) {
