@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <string>
+#include <string_view>
 
 #include "platform/system/shown.h"
 
@@ -34,6 +35,7 @@ TEST(Escaped, TextOfAllLanguagesStays) {
 
 TEST(Escaped, NoUtf8IsShownByteForByte) {
   EXPECT_EQ(escaped("\xe3\x82"), "\\xe3\\x82") << "cut off";
+  EXPECT_EQ(escaped(std::string_view("\xe3\x82\xab", 2)), "\\xe3\\x82") << "by a view";
   EXPECT_EQ(escaped("\xc0\x9b"), "\\xc0\\x9b") << "longer than it must be";
   EXPECT_EQ(escaped("\xed\xa0\x80"), "\\xed\\xa0\\x80") << "half of a pair";
 }
