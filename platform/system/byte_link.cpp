@@ -94,7 +94,7 @@ ByteLink::ByteLink(const ByteLinkOptions& options)
       error_ = "no device is given; expected a path or tcp://host:port or udp://host:port";
     } else if (!is_baud(options_.baud)) {
       error_ = std::to_string(options_.baud) +
-               " baud is no speed of a serial line; expected 1200, 2400, ... 115200";
+               " baud is not a speed of a serial line; expected 1200, 2400, ... 115200";
     } else {
       kind_ = Kind::kSerial;
     }

@@ -127,7 +127,8 @@ TEST(ImageCheck, SaysThatThereAreNoImages) {
   ImageCheck check;
   EXPECT_THAT(check.report(kNeeds).findings, IsEmpty());
   check.add(0, {}, false);
-  EXPECT_THAT(advice(check.report(kNeeds).findings), ElementsAre(HasSubstr("no pictures")));
+  EXPECT_THAT(advice(check.report(kNeeds).findings),
+              ElementsAre(HasSubstr("no picture could be used")));
   EXPECT_THAT(describe(check.report(kNeeds)), IsEmpty());
 }
 

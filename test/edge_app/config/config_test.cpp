@@ -849,7 +849,7 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"HeadWithoutPort", VIDEO "pan_tilt: {type: ptu, url: tcp://head}\n",
                 ":2: pan_tilt.url", "is not an address tcp://host:port or udp://host:port"},
         Mistake{"OddBaud", VIDEO "pan_tilt: {type: pelco_d, device: /dev/x, baud: 9601}\n",
-                ":2: pan_tilt.baud", "is no speed of a serial line"},
+                ":2: pan_tilt.baud", "is not a speed of a serial line"},
         Mistake{"BaudOfASocket", VIDEO "pan_tilt: {type: pelco_d, url: tcp://h:1, baud: 9600}\n",
                 ":2: pan_tilt.baud", "unknown key"},
         Mistake{"MoreThanTheLineCarries",
