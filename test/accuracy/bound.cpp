@@ -102,7 +102,7 @@ class Differences {
           changed.aspect += change;
           break;
         case Parameter::kRadialDistortion:
-          changed.distortion.radial += change;
+          changed.radial_distortion += change;
           break;
         case Parameter::kCentreU:
         case Parameter::kCentreV:

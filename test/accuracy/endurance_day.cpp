@@ -263,7 +263,7 @@ VirtualDay::VirtualDay(const DayPlan& plan, const std::filesystem::path& scenes)
     simulator::CameraConfig camera = config_.camera;
     camera.focal_length = std::pow(kWide.focal_length, 1 - zoom) *
                           std::pow(kNarrow.focal_length, zoom) * plan_.width / 480;
-    camera.distortion.radial = between(kWide.radial_distortion, kNarrow.radial_distortion, zoom);
+    camera.radial_distortion = between(kWide.radial_distortion, kNarrow.radial_distortion, zoom);
     return std::make_shared<const simulator::CameraModel>(camera, config_.image, *path_);
   };
   wide_ = lens_of(0);
@@ -441,7 +441,7 @@ std::shared_ptr<const simulator::CameraModel> VirtualDay::lens_at(double time_s)
   const Optics optics = optics_at(time_s);
   simulator::CameraConfig camera = config_.camera;
   camera.focal_length = optics.focal_length;
-  camera.distortion.radial = optics.radial_distortion;
+  camera.radial_distortion = optics.radial_distortion;
   return std::make_shared<const simulator::CameraModel>(camera, config_.image, *path_);
 }
 

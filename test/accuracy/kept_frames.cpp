@@ -38,7 +38,7 @@ std::string image_key(const Config& config) {
   const auto& [image, camera, path, scene, sensor] =
       std::tie(config.image, config.camera, config.path, config.scene, config.sensor);
   add(config.seed, config.duration, image.width, image.height, image.rate_hz);
-  add(camera.focal_length, camera.aspect, camera.distortion.radial, camera.line_delay);
+  add(camera.focal_length, camera.aspect, camera.radial_distortion, camera.line_delay);
   add(camera.pan_axis_offset.transpose(), camera.tilt_axis_offset.transpose());
   add(static_cast<int>(path.type), path.amplitude, path.period, path.stop, path.pan, path.tilt,
       path.file.string());

@@ -195,7 +195,7 @@ MapAdjustment adjust_variant(const Stills& stills, const Variant& variant) {
   if (variant.homographies) return chain(stills);
   constexpr double kHeld = 1e-7;
   MapOptions options;
-  options.lens = LensCurve({kWide_px, 1, 0, kWidth, kHeight}, stills.first_position,
+  options.lens = LensCurve({kWide_px, 1, {0}, kWidth, kHeight}, stills.first_position,
                            stills.last_position, 0.3);
   if (variant.free_focal_lengths) options.level_sigma[0] = kHeld;
   if (variant.no_distortion) options.level_sigma[1] = kHeld;

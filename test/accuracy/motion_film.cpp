@@ -44,7 +44,7 @@ simulator::Config config_of(const MotionFilmPlan& plan, const std::filesystem::p
   config.duration = plan.duration_s;
   config.image = {1280, 720, 25};
   config.camera.focal_length = kFocalLength;
-  config.camera.distortion.radial = 55.4;
+  config.camera.radial_distortion = 55.4;
   config.camera.line_delay = -14.2e-6;
   config.camera.pan_axis_offset = {-12e-3, 0};
   config.camera.tilt_axis_offset = {0, 14e-3};

@@ -20,7 +20,7 @@ Config camera_on_path(const Scene& scene, PathType path, double line_delay_1080,
   config.duration = size.duration_s;
   config.image = {size.width, size.height, size.rate_hz};
   config.camera.focal_length = kFocalLength1920 * size.width / 1920;
-  config.camera.distortion.radial = 55.4;
+  config.camera.radial_distortion = 55.4;
   config.camera.line_delay = line_delay_1080 * 1080 / size.height;
   config.camera.pan_axis_offset = {-12e-3, 0};
   config.camera.tilt_axis_offset = {0, 14e-3};

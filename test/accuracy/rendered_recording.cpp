@@ -123,7 +123,7 @@ Calibration RenderedRecording::calibration() const {
   Calibration calibration;
   calibration.camera = {config_.camera.focal_length,
                         config_.camera.aspect,
-                        {config_.camera.distortion.radial},
+                        {config_.camera.radial_distortion},
                         config_.image.width,
                         config_.image.height};
   calibration.line_delay = config_.camera.line_delay;

@@ -85,7 +85,7 @@ VideoRecording video_recording(int number) {
   c.duration = slow ? kSlowDuration_s : size.duration_s;
   if (slow) c.image.rate_hz /= 1.5;
   c.camera.focal_length = 0.5 * size.width / std::tan(0.5 * field);
-  c.camera.distortion.radial = pick(kCornerDistortions, number / 2) *
+  c.camera.radial_distortion = pick(kCornerDistortions, number / 2) *
                                std::pow(2 * c.camera.focal_length, 2) /
                                (std::pow(size.width, 2) + std::pow(size.height, 2));
   c.camera.line_delay = pick(kReadouts, number / 5) / (c.image.rate_hz * size.height);
@@ -123,7 +123,7 @@ std::optional<VideoErrors> calibrate_video_recording(const VideoRecording& recor
     simulator::write_recording(recording.config, folder);
     CalibrationJob job = load_calibration_jobs(folder.string()).front();
     StopSignals signals;
-    const CalibrationResult result = calibrate_job(folder.string(), 2, &job, &signals);
+    const CalibrationResult result = calibrate_job(2, &job, &signals);
     Calibration truth;
     const bool read = load_calibration((folder / "truth.yaml").string(), &truth, error);
     if (!read) return std::nullopt;

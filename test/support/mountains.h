@@ -12,7 +12,7 @@ inline simulator::Config camera_before_mountains(const simulator::ImageConfig& i
   simulator::Config config;
   config.image = image;
   config.camera.focal_length = focal_length;
-  config.camera.distortion.radial = 0.3;
+  config.camera.radial_distortion = 0.3;
   config.camera.line_delay = 50e-6;
   simulator::PatchConfig mountains;
   mountains.file = ALIDADE_TEST_DATA "/picosdeeuropa_by_Aitzol_Berasategi.jpg";

@@ -215,7 +215,7 @@ AdjustmentProblem make_ugly_problem(const Ugly& ugly) {
   AdjustmentProblem problem;
   AdjustmentState& s = problem.start;
   s.camera = {ugly.focal_length, ugly.aspect, {0}, 1920, 1080, 14, -9};
-  s.corner_distortion[0] = ugly.corner_distortion[0];
+  s.corner_distortion[0] = ugly.distortion;
   s.readout_s = ugly.readout_s;
   s.mechanics.pan_axis = Vector3<double>(0.03, -0.01, 1).normalized();
   s.mechanics.tilt_axis = Vector3<double>(-0.02, 1, 0.04).normalized();

@@ -11,7 +11,7 @@ namespace {
 
 // From 1000 to 20000 px; delta, distortion and centre wander.
 LensCurve wandering_lens() {
-  LensCurve lens({1000, 1.01, -0.03, 1280, 720, 5, -3}, std::log(1000.0), std::log(20000.0), 0.5);
+  LensCurve lens({1000, 1.01, {-0.03}, 1280, 720, 5, -3}, std::log(1000.0), std::log(20000.0), 0.5);
   for (int i = 0; i < lens.control_points(); ++i) {
     lens.control_point(i) += LensQuantities(0.03 * std::sin(i), 0.02 * std::cos(2 * i),
                                             4 * std::sin(1.3 * i), 2 * std::cos(i));
@@ -41,7 +41,7 @@ TEST(LensCurve, OffItsCurveItKeepsTheCornerOrKOrLiesBetween) {
     const Camera<double> off = lens.camera_at(s, eps);
     EXPECT_NEAR(std::log(off.focal_length / on.focal_length), eps, 1e-12);
     EXPECT_NEAR(std::log(off.distortion.radial / on.distortion.radial), 2 * hold * eps, 1e-12);
-    EXPECT_EQ(lens.camera_at(s).radial_distortion, on.distortion.radial) << hold;
+    EXPECT_EQ(lens.camera_at(s).distortion.radial, on.distortion.radial) << hold;
   }
   // With the corner kept, its distortion in pixels is the same.
   const Camera<double> off = lens.camera_at(s, eps);
@@ -72,7 +72,7 @@ TEST(LensCurve, ItsSlopeIsTheNumericOne) {
     const NumericFunction<5, 1> f = [&](const Matrix<double, 1, 1>& change) {
       const Camera<double> c = lens.camera_of(log_f + change[0]);
       return std::optional<Matrix<double, 5, 1>>({c.focal_length / at.focal_length, c.aspect,
-                                                  c.radial_distortion / per_corner, c.centre_u,
+                                                  c.distortion.radial / per_corner, c.centre_u,
                                                   c.centre_v});
     };
     const auto numeric = numeric_jacobian<5, 1>(f, 1e-4);

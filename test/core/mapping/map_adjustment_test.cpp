@@ -92,7 +92,7 @@ SmallMap small_map(std::uint64_t seed, double wrong_share, double apart = 0,
 
 MapOptions small_options() {
   MapOptions out;
-  out.lens = LensCurve({kWide_px, 1, 0, 1280, 720}, std::log(kWide_px) - 0.01,
+  out.lens = LensCurve({kWide_px, 1, {0}, 1280, 720}, std::log(kWide_px) - 0.01,
                        std::log(kTele_px) + 0.01, 0.35);
   return out;
 }

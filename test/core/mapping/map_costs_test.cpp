@@ -57,7 +57,7 @@ TEST(MapCosts, WhatIsSeenHasTheNumericJacobians) {
     picture.position = std::log(f) + 0.013;
     picture.motion = simulated.knowledge(true).motion;
     picture.R_start = simulated.base_from_camera(0);
-    const LensCurve lens({f, 1, 0, 1280, 720}, std::log(1000.0), std::log(30000.0), 0.4);
+    const LensCurve lens({f, 1, {0}, 1280, 720}, std::log(1000.0), std::log(30000.0), 0.4);
     const Vector3<double> d = simulated.direction_of({300, 600});
     MapObservation seen;
     seen.u = {301, 599};

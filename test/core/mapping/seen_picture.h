@@ -38,7 +38,7 @@ struct SeenPicture {
     simulator::Lens out;
     out.focal_length = focal_length * std::exp(zoom_rate * time);
     const double per_corner = out.focal_length / (std::hypot(width, height) / 2);
-    out.distortion.radial = corner_distortion * per_corner * per_corner;
+    out.radial_distortion = corner_distortion * per_corner * per_corner;
     out.centre = Eigen::Vector2d(width, height) / 2 + centre_offset;
     return out;
   }
@@ -67,7 +67,7 @@ struct SeenPicture {
     const simulator::Lens at = lens(0);
     out.lens = LensCurve::of({at.focal_length,
                               1,
-                              {at.distortion.radial},
+                              {at.radial_distortion},
                               width,
                               height,
                               centre_offset.x(),

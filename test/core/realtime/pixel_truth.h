@@ -45,7 +45,7 @@ inline Eigen::Vector3d true_direction(const TrueCamera& camera,
   const double y_d = (pixel.y() - 0.5 * camera.height - camera.centre_offset.y()) /
                      (camera.focal_length * camera.aspect);
   const double r_d = std::hypot(x_d, y_d);
-  const double ratio = r_d > 0 ? undistorted_radius(camera.distortion.radial, r_d) / r_d : 1;
+  const double ratio = r_d > 0 ? undistorted_radius(camera.radial_distortion, r_d) / r_d : 1;
   // x right, y down, z forward becomes forward, right, down.
   const Eigen::Vector3d ray = Eigen::Vector3d(1, ratio * x_d, ratio * y_d).normalized();
   return Eigen::AngleAxisd(angle.x(), camera.pan_axis) *

@@ -289,7 +289,7 @@ TEST_F(ConfigTest, EveryKeyIsRead) {
   EXPECT_EQ(config_.pan_tilt.angle_quantum_rad, 1e-4);
   EXPECT_EQ(config_.camera.focal_length_px, 30000);
   EXPECT_EQ(config_.camera.aspect, 1.01);
-  EXPECT_EQ(config_.camera.distortion.radial, -2.5);
+  EXPECT_EQ(config_.camera.radial_distortion, -2.5);
   EXPECT_EQ(config_.camera.line_delay_s, 1.5e-5);
   EXPECT_TRUE(config_.camera.upside_down);
   EXPECT_EQ(config_.calibration.file, "/etc/c.yaml");

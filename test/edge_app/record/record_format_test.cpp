@@ -40,7 +40,7 @@ OrientationRecord full_record() {
   record.camera.line_delay = -1.42e-5;
   record.calibration = {CalibrationActivity::kWatching, CalibrationNeed::kNothing};
   record.camera.focal_length = 32008;
-  record.camera.distortion.radial = 55.4;
+  record.camera.radial_distortion = 55.4;
   record.camera.covariance[0] = 24 * 24;
   record.camera.centre_u = 3.5;
   record.camera.centre_v = -2;

@@ -32,7 +32,7 @@ class CalibrationSessionTest : public ::testing::Test {
     return sample;
   }
   // 0.3 of a field of view of half a radian.
-  static Camera<double> camera() { return {2.0 * kWidth, 1, 0, kWidth, kHeight}; }
+  static Camera<double> camera() { return {2.0 * kWidth, 1, {0}, kWidth, kHeight}; }
 
   // The keyframe of a head that points there. False: none is wanted.
   bool take_keyframe(double pan_rad, double tilt_rad = 0) {

@@ -76,7 +76,7 @@ class KeyframeMap : public ::testing::Test {
     const simulator::CameraConfig& camera = config_.camera;
     result_.status = CalibrationStatus::kOk;
     result_.calibration.camera = {
-        camera.focal_length, camera.aspect, {camera.distortion.radial}, kWidth, kHeight};
+        camera.focal_length, camera.aspect, {camera.radial_distortion}, kWidth, kHeight};
     result_.calibration.line_delay = camera.line_delay;
     result_.trajectory = spline_of(*path_);
     result_.telemetry_residuals = residuals(kPixel, kPixel);

@@ -1028,13 +1028,13 @@ TEST(OrientationStep, RefusesOptionsOfOeModeThatAreNotValid) {
 
 TEST(OrientationStep, HasValidOptionsOfOeModeForImagesOfEverySize) {
   for (int width = 1; width < 10000; width = width * 3 / 2 + 1) {
-    const OeOptions options = oe_options({2000, 1, 0, width, (width + 1) / 2});
+    const OeOptions options = oe_options({2000, 1, {0}, width, (width + 1) / 2});
     const char* error = "";
     EXPECT_TRUE(options.validate(&error)) << width << ": " << error;
     EXPECT_EQ(options.max_width, width);
   }
-  EXPECT_EQ(oe_options({2000, 1, 0, 1920, 1080}).maker.cell_size_px, 80);
-  EXPECT_EQ(oe_options({2000, 1, 0, 960, 540}).maker.cell_size_px, 40);
+  EXPECT_EQ(oe_options({2000, 1, {0}, 1920, 1080}).maker.cell_size_px, 80);
+  EXPECT_EQ(oe_options({2000, 1, {0}, 960, 540}).maker.cell_size_px, 40);
 }
 
 TEST_F(OeStepTest, WithoutACalibrationItFollowsPointsAndAnswersFromTelemetry) {

@@ -53,7 +53,7 @@ class WithoutTelemetry : public testing::Test {
   void begin(std::uint64_t seed) {
     OrientationStepOptions options;
     Calibration& calibration = options.calibration;
-    calibration.camera = {kFocalLength, 1, {config_.camera.distortion.radial}, 480, 270};
+    calibration.camera = {kFocalLength, 1, {config_.camera.radial_distortion}, 480, 270};
     calibration.line_delay = config_.camera.line_delay;
     options.calibrated = true;
     options.has_telemetry = false;

@@ -47,7 +47,7 @@ TEST(ZoomLaw, DistortionInTheCornerStays) {
 // The picture of a zoomed lens is that of before, larger: seen from the directions d whose x is
 // smaller by the same factor.
 TEST(ZoomLaw, AZoomedLensShowsAnEnlargedPicture) {
-  const Camera<double> camera{900, 1.02, -0.2, 640, 480, 5, -3};
+  const Camera<double> camera{900, 1.02, {-0.2}, 640, 480, 5, -3};
   const Camera<double> there = zoomed(camera, std::log(2.5));
   Vector2<double> u, zoomed_u;
   ASSERT_EQ(project(camera, {0.3, -0.2, 1}, &u), ProjectionStatus::kOk);
@@ -106,7 +106,7 @@ TEST(ZoomLaw, QuantitiesComeBack) {
 
 // A Jacobian by the zoomed camera becomes one by the camera before.
 TEST(ZoomLaw, JacobiansReferToTheCameraBefore) {
-  const Camera<double> camera{900, 1.02, -0.2, 640, 480, 5, -3};
+  const Camera<double> camera{900, 1.02, {-0.2}, 640, 480, 5, -3};
   constexpr double kChange = 0.4;
   const Vector3<double> d(0.2, 0.15, 1);
   const Camera<double> there = zoomed(camera, kChange);
@@ -120,7 +120,7 @@ TEST(ZoomLaw, JacobiansReferToTheCameraBefore) {
       [&](const Column& change) -> std::optional<Vector2<double>> {
         const Camera<double> changed{camera.focal_length + change[0],
                                      camera.aspect + change[1],
-                                     camera.distortion.radial + change[2],
+                                     {camera.distortion.radial + change[2]},
                                      camera.width,
                                      camera.height,
                                      camera.centre_u + change[3],
@@ -146,7 +146,7 @@ TEST(ZoomLaw, JacobiansReferToTheCameraBefore) {
 }
 
 TEST(ZoomLaw, NoDistortionStaysNone) {
-  Camera<double> camera{900, 1, 0, 640, 480};
+  Camera<double> camera{900, 1, {0}, 640, 480};
   EXPECT_EQ(zoomed(camera, 2).distortion.radial, 0);
   EXPECT_EQ(corner_distortion(camera)[0], 0);
   set_corner_distortion(CornerDistortion<double>(0.1), &camera);

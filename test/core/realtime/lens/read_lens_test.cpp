@@ -25,7 +25,7 @@ ZoomCurve straight_curve() {
   content.nodes = 2;
   content.reading = {0, 100};
   content.repeatability = kRepeats;
-  content.shared.camera = {kWide, 1, 0, 1280, 720, 0, 0};
+  content.shared.camera = {kWide, 1, {0}, 1280, 720, 0, 0};
   content.level[0] = (std::log(kWide) + std::log(kTele)) / 2;
   content.value.setZero(2 * kZoomQuantityCount, 1);
   content.value(0, 0) = std::log(kWide) - content.level[0];
@@ -58,7 +58,7 @@ class ToldLens : public testing::Test {
   // Landmarks of that frame show this focal length.
   void show(double focal_length, double rate = 0) {
     Calibration found;
-    found.camera = {focal_length, 1, 0, 1280, 720, 0, 0};
+    found.camera = {focal_length, 1, {0}, 1280, 720, 0, 0};
     lens_.note_found(found, rate);
     lens_.judge(found);
   }

@@ -352,7 +352,7 @@ TEST(ViewProjection, RefusesWhatTheCameraDoesNotSee) {
     // Of the row that looks along the axis.
     const double k =
         camera_at_row(named.camera, view.motion, view.calibration.line_delay, view.middle_row())
-            .radial_distortion;
+            .distortion.radial;
     if (k < -1e-9) refused({1.01 / std::sqrt(-3 * k), 0, 1});
     EXPECT_LT((projection.optical_axis() - R.col(2)).norm(), 1e-12);
   });

@@ -42,7 +42,7 @@ sim::Config camera(double field_deg, double k_r2_in_corners) {
   const double slope = std::tan(0.5 * field_deg * kDegree);
   config.camera.focal_length = 0.5 * kTrackedWidth / slope;
   const double corner = slope * std::hypot(kTrackedWidth, kTrackedHeight) / kTrackedWidth;
-  config.camera.distortion.radial = k_r2_in_corners / (corner * corner);
+  config.camera.radial_distortion = k_r2_in_corners / (corner * corner);
   config.path.amplitude = 0;
   config.sensor.exposure = 0.002;
   config.sensor.read_noise = 2;
