@@ -71,8 +71,8 @@ struct Pace {
         1e3 * readout_s, 180 / kPi * most_px / longest_f / readout_s, longest_f);
     if (!is_known) {
       out += fmt::format(
-          " (that read-out time is a guess; with a calibration beside the first recording, or by "
-          "--calibration, {:g} px are allowed)",
+          " (that read-out time is a guess; with a calibration of `alidade calibrate` beside the "
+          "first recording, or by --calibration, {:g} px are allowed)",
           KeyframeChoiceOptions().most_motion_px * kMostKnownHaste);
     }
     return out;

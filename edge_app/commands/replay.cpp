@@ -78,10 +78,11 @@ void check_size(const RecordingInfo& info, const PublishedCalibration& calibrati
   if (info.width == camera.width && info.height == camera.height) return;
   throw CommandError(
       kExitFailed,
-      fmt::format("{}: frames have {}x{} px, but {} is for {}x{} px; give a calibration for this "
-                  "size with --calibration, or record at the calibration's size",
-                  recording, info.width, info.height, calibration.name, camera.width,
-                  camera.height));
+      fmt::format(
+          "{}: frames have {}x{} px, but {} is for {}x{} px; give a calibration for this "
+          "size with --calibration, or set video.width and video.height to the calibration's "
+          "size and record again",
+          recording, info.width, info.height, calibration.name, camera.width, camera.height));
 }
 
 // The next item of a recording; empty at its end.

@@ -18,16 +18,18 @@ bool LookOptions::validate(const char** error) const {
 
 bool OeOptions::validate(const char** error) const {
   const char* problem = nullptr;
-  if (search.choice.max_chosen < solve.min_inliers)
-    problem = "max_chosen must not be less than min_inliers";
   if (max_landmarks < 1) problem = "max_landmarks must be at least 1";
   if (max_width < 1 || max_height < 1) problem = "max_width and max_height must be positive";
   if (error != nullptr && problem != nullptr) *error = problem;
-  return problem == nullptr && octaves.validate(error) && noise.validate(error) &&
-         prediction.validate(error) && search.validate(error) && look.validate(error) &&
-         solve.validate(error) && offset.validate(error) && tie.validate(error) &&
-         lens.validate(error) && shear.validate(error) && upkeep.validate(error) &&
-         maker.validate(error);
+  const bool each_is_valid = problem == nullptr && octaves.validate(error) &&
+                             noise.validate(error) && prediction.validate(error) &&
+                             search.validate(error) && look.validate(error) &&
+                             solve.validate(error) && offset.validate(error) &&
+                             tie.validate(error) && lens.validate(error) && shear.validate(error) &&
+                             upkeep.validate(error) && maker.validate(error);
+  if (!each_is_valid || search.choice.max_chosen >= solve.min_inliers) return each_is_valid;
+  if (error != nullptr) *error = "max_chosen must not be less than min_inliers";
+  return false;
 }
 
 }  // namespace alidade

@@ -461,7 +461,7 @@ TEST(QuerySource, FailsForGoodOnWhatIsNoLine) {
   odd.link.baud = 9601;
   QuerySource source(std::make_unique<PelcoDProtocol>(PelcoDOptions{}), odd);
   EXPECT_EQ(read_until(source, sample, ReadStatus::kFailed), ReadStatus::kFailed);
-  EXPECT_THAT(source.error(), HasSubstr("9601 baud is no speed"));
+  EXPECT_THAT(source.error(), HasSubstr("9601 baud is not a speed"));
 }
 
 TEST(QuerySource, LetsOneProgramAtATimeHaveTheLine) {
