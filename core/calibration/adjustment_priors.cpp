@@ -28,6 +28,7 @@ PriorKnowledge prior_knowledge(int width, int height, const CalibrationOptions& 
     mean.camera.aspect = options.aspect->value;
     set(Parameter::kAspect, options.aspect->sigma / options.aspect->value);
   }
+  static_assert(kDistortionCount == 1, "a prior for each term");
   if (options.radial_distortion) {
     const double unit = corner_unit(mean.camera)[0];
     mean.corner_distortion[0] = options.radial_distortion->value / unit;

@@ -14,6 +14,7 @@
 
 namespace alidade {
 
+static_assert(kDistortionCount == 1, "each term is compared; thresholds go by their number");
 inline constexpr std::array<Parameter, 8> kComparedParameters = {
     Parameter::kFocalLength, Parameter::kRadialDistortion, Parameter::kLineDelay,
     Parameter::kPanAxis0,    Parameter::kPanAxis1,         Parameter::kTiltAxis0,

@@ -27,6 +27,7 @@ void insert_between(double reading, std::vector<int>* node_of, ZoomEvidence* evi
   const int node = insert_node(reading, evidence);
   evidence->is_between[static_cast<std::size_t>(node)] = true;
   for (int& other : *node_of) other += other >= node ? 1 : 0;
+  static_assert(kDistortionCount == 1, "a loose sigma for each quantity");
   const std::array<double, kZoomQuantityCount> any = {0, kAnyDistortion, kAnyCentre_px,
                                                       kAnyCentre_px};
   for (int q = 1; q < kZoomQuantityCount; ++q) {

@@ -262,6 +262,7 @@ void judge(const CalibrationOptions& options, const MotionExtent& motion,
         text("read-out known to %.1f ms only: move faster while the image is read out",
              1e3 * readout_error));
   }
+  static_assert(kDistortionCount == 1, "each term is to be known well enough");
   const double distortion_error =
       parameter_sigma(c, Parameter::kRadialDistortion) / corner_unit(c.camera)[0];
   if (distortion_error > kMaxDistortionError) {

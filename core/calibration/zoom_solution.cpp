@@ -58,6 +58,7 @@ double rise_of(const ZoomEvidence& evidence) {
 // the corner is some hundredths, and the centre is within a hundredth of the image and wanders by
 // half of that.
 std::array<ZoomSmoothness, kZoomQuantityCount> usual(double rise, const Camera<double>& camera) {
+  static_assert(kDistortionCount == 1, "a usual smoothness for each quantity");
   const double centre_px = kUsualCentreShare * camera.width;
   return {ZoomSmoothness{5, 20, 1.5 * std::max(std::abs(rise), 0.1)}, ZoomSmoothness{0.3, 0.3, 0.1},
           ZoomSmoothness{centre_px, centre_px, 0.5 * centre_px},

@@ -12,6 +12,7 @@ namespace alidade::internal {
 
 namespace {
 
+static_assert(kDistortionCount == 1, "a name and a limit for each quantity");
 constexpr std::array<const char*, kZoomQuantityCount> kQuantityNames = {
     "log_focal_length", "corner_distortion", "centre_u", "centre_v"};
 // A value beyond these is in another unit.

@@ -51,6 +51,7 @@ struct MapOptions {
   std::optional<LensCurve> start;
   // Prior sigmas of a control point's delta, kappa, c_u, c_v about `lens`, and of second
   // differences of neighbouring control points.
+  static_assert(kDistortionCount == 1, "a sigma for each quantity");
   LensQuantities level_sigma{0.05, 0.1, 30, 30};
   LensQuantities bend_sigma{0.02, 0.02, 3, 3};
   double hold_sigma = 0.5;  // of the lens's hold about that of `lens`

@@ -23,7 +23,7 @@ ordered_json parameters_json(const Calibration& calibration) {
   };
   scalar(Parameter::kFocalLength);
   scalar(Parameter::kAspect);
-  scalar(Parameter::kRadialDistortion);
+  for (int i = 0; i < kDistortionCount; ++i) scalar(distortion_parameter(i));
   if (calibration.has_centre()) {
     parameters["centre_offset"] = {
         {"value", {calibration.camera.centre_u, calibration.camera.centre_v}},
@@ -67,9 +67,12 @@ ordered_json zoom_curve_json(const ZoomCurve& curve) {
     if (content.is_between[static_cast<std::size_t>(i)]) continue;  // the samples show it
     const ordered_json all = parameters_json(curve.node(i));
     ordered_json node{{"reading", content.reading[static_cast<std::size_t>(i)]}};
-    for (const char* name : {"focal_length", "radial_distortion", "centre_offset"}) {
+    const auto take = [&](const char* name) {
       if (all.contains(name)) node[name] = all[name];
-    }
+    };
+    take(to_string(Parameter::kFocalLength));
+    for (const char* name : Distortion<double>::kNames) take(name);
+    take("centre_offset");
     nodes.push_back(std::move(node));
   }
   ordered_json readings = ordered_json::array();

@@ -118,6 +118,16 @@ void SelfCalibration::judge_agreement(const FrameTracks& tracks) {
   if (tracks.tracker != FrameTracks::Tracker::kOe || !is_calibrated_here()) return;
   const bool contradicted = tracks.oe_status == OeStatus::kContradiction;
   if (!disagreement_.judge(tracks.stamp.receive_time_s, contradicted)) return;
+  if (!options_.automatic) {
+    // Nothing would take its place.
+    say_once(
+        fmt::format("landmarks contradict telemetry in half of the frames (was the camera "
+                    "moved on its mount, or its lens?); the calibration {} stays in use, as "
+                    "calibration.auto is false: calibrate again",
+                    published_->name));
+    disagreement_.restart();
+    return;
+  }
   auto withdrawn = std::make_shared<PublishedCalibration>();
   withdrawn->calibration = published_->calibration;
   withdrawn->calibration.covariance = options_.data_sheet.covariance;

@@ -128,6 +128,7 @@ void write_lens(const LensCurve& lens, SqliteDatabase* database) {
     knot.bind(2, lens.knot(i));
     knot.run();
   }
+  static_assert(kDistortionCount == 1, "a column for each quantity: a new kSceneMapFormat");
   SqliteStatement point(database, "INSERT INTO lens_point VALUES(?,?,?,?,?)");
   for (int i = 0; i < lens.control_points(); ++i) {
     point.bind(1, std::int64_t{i});

@@ -49,14 +49,16 @@ struct RadialDistortion {
 
   [[nodiscard]] S& operator[](int) { return radial; }
   [[nodiscard]] const S& operator[](int) const { return radial; }
-  // For code that names the term. With a second term it does not compile: each caller must then say
-  // what becomes of the other.
+  // For code that names the term. With a second term no caller compiles: each must then say what
+  // becomes of the other. (A template, so that the compiler complains about the callers.)
+  template <int kTerms = kCount>
   [[nodiscard]] S& only_term() {
-    static_assert(kCount == 1, "names one term of several");
+    static_assert(kTerms == 1, "names one term of several");
     return radial;
   }
+  template <int kTerms = kCount>
   [[nodiscard]] const S& only_term() const {
-    static_assert(kCount == 1, "names one term of several");
+    static_assert(kTerms == 1, "names one term of several");
     return radial;
   }
 

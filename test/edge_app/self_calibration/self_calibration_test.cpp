@@ -287,6 +287,31 @@ TEST(SelfCalibration, WithdrawsWhatLandmarksContradictForLong) {
   EXPECT_EQ(calibration.report().activity, CalibrationActivity::kWatching);
 }
 
+// Without automatic calibration nothing would take its place: it is said, once, and stays.
+TEST(SelfCalibration, KeepsAContradictedCalibrationIfItIsNotAutomatic) {
+  const test::Simulation s = camera();
+  MemoryArchive archive;
+  {
+    SelfCalibration automatic(options_for(s), &archive);
+    ASSERT_FALSE(feed(&automatic, s, {}).empty());
+  }
+  SelfCalibrationOptions options = options_for(s);
+  options.automatic = false;
+  SelfCalibration calibration(options, &archive);
+  ASSERT_TRUE(calibration.first()->calibrated);
+  const Calibration kept = calibration.first()->calibration;
+  for (const double from_s : {0.0, 20.0}) {
+    EXPECT_THAT(feed(&calibration, s, {FrameTracks::Tracker::kOe, {}, from_s, false, 0, 1000}),
+                IsEmpty());
+  }
+  EXPECT_TRUE(calibration.first()->calibrated);
+  EXPECT_EQ(calibration.first()->calibration.covariance, kept.covariance);
+  EXPECT_EQ(calibration.report().activity, CalibrationActivity::kOff);
+  EXPECT_THAT(
+      calibration.take_messages(),
+      Contains(AllOf(HasSubstr("stays in use"), HasSubstr("calibration.auto is false"))).Times(1));
+}
+
 // A file that landmarks contradict is not taken up with the next sample that tells its zoom.
 TEST(SelfCalibration, DoesNotTakeUpAgainWhatItHasWithdrawn) {
   const test::Simulation s = camera();

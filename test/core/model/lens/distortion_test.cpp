@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+#include <cmath>
 #include <optional>
 #include <vector>
 
@@ -20,7 +22,55 @@ std::vector<BrownDistortion<double>> brown_lenses() {
   return {{}, {-0.28, 0.08, 1e-3, -2e-3}, {0.3, -0.05, -1e-3, 5e-4}, {0, 0, 0.01, 0.02}};
 }
 
-TEST(Distortion, TermsHaveNamesAndOrders) {
+// The camera's kind, with each term alone and all together.
+std::vector<Distortion<double>> camera_lenses() {
+  std::vector<Distortion<double>> out(1);
+  Distortion<double> all;
+  for (int i = 0; i < kDistortionCount; ++i) {
+    Distortion<double> alone;
+    alone[i] = i % 2 == 0 ? -0.12 : 0.05;
+    all[i] = alone[i];
+    out.push_back(alone);
+  }
+  out.push_back(all);
+  return out;
+}
+
+template <class Kind>
+void expect_orders_of_the_model(const Kind& lens, const Kind& scaled, double scale) {
+  for (const Vec2& x : shown_points()) {
+    Vec2 plain, of_scaled;
+    ASSERT_TRUE(lens.distort(x, &plain));
+    ASSERT_TRUE(scaled.distort(scale * x, &of_scaled));
+    EXPECT_LT((of_scaled - scale * plain).norm(), 1e-14);
+  }
+}
+
+template <class Kind>
+void expect_derivatives_of_the_model(const Kind& lens) {
+  for (const Vec2& x : shown_points()) {
+    Vec2 x_d;
+    Matrix2<double> J;
+    ASSERT_TRUE(lens.distort(x, &x_d, &J));
+    const auto by_x = test::numeric_jacobian<2, 2>(
+        [&](const Vec2& change) -> std::optional<Vec2> {
+          Vec2 out;
+          if (!lens.distort(x + change, &out)) return std::nullopt;
+          return out;
+        },
+        Vec2(Vec2::Constant(1e-4)));
+    EXPECT_LT(test::disagreement(J, by_x, 1e-14), 1) << x.transpose();
+  }
+}
+
+TEST(Distortion, EachTermHasAPlaceANameAndAnOrder) {
+  Distortion<double> lens;
+  for (int i = 0; i < kDistortionCount; ++i) lens[i] = i + 1;
+  for (int i = 0; i < kDistortionCount; ++i) {
+    EXPECT_EQ(lens[i], i + 1);
+    EXPECT_EQ(lens.cast<float>()[i], static_cast<float>(i + 1));
+    EXPECT_STRNE(Distortion<double>::kNames[static_cast<std::size_t>(i)], "");
+  }
   EXPECT_STREQ(Distortion<double>::kNames[0], "radial_distortion");
   EXPECT_EQ(Distortion<double>::kOrders[0], 2);
   const BrownDistortion<double> brown{1, 2, 3, 4};
@@ -30,18 +80,20 @@ TEST(Distortion, TermsHaveNamesAndOrders) {
 // Scaling the picture of directions by s multiplies a term of order n by s^-n.
 TEST(Distortion, OrdersAreThoseOfTheModel) {
   constexpr double kScale = 1.3;
+  for (const Distortion<double>& lens : camera_lenses()) {
+    Distortion<double> scaled;
+    for (int i = 0; i < kDistortionCount; ++i) {
+      const int order = Distortion<double>::kOrders[static_cast<std::size_t>(i)];
+      scaled[i] = lens[i] / std::pow(kScale, order);
+    }
+    expect_orders_of_the_model(lens, scaled, kScale);
+  }
   for (const BrownDistortion<double>& lens : brown_lenses()) {
     std::array<double, BrownDistortion<double>::kCount> terms{};
     for (std::size_t i = 0; i < terms.size(); ++i) {
       terms[i] = lens[static_cast<int>(i)] / std::pow(kScale, BrownDistortion<double>::kOrders[i]);
     }
-    const BrownDistortion<double> scaled{terms[0], terms[1], terms[2], terms[3]};
-    for (const Vec2& x : shown_points()) {
-      Vec2 plain, of_scaled;
-      ASSERT_TRUE(lens.distort(x, &plain));
-      ASSERT_TRUE(scaled.distort(kScale * x, &of_scaled));
-      EXPECT_LT((of_scaled - kScale * plain).norm(), 1e-14);
-    }
+    expect_orders_of_the_model(lens, {terms[0], terms[1], terms[2], terms[3]}, kScale);
   }
 }
 
@@ -59,26 +111,20 @@ TEST(Distortion, BrownWithOneTermIsTheCameras) {
 }
 
 TEST(Distortion, DerivativesAreThoseOfTheModel) {
-  for (const BrownDistortion<double>& lens : brown_lenses()) {
-    for (const Vec2& x : shown_points()) {
-      Vec2 x_d;
-      Matrix2<double> J;
-      ASSERT_TRUE(lens.distort(x, &x_d, &J));
-      const auto by_x = test::numeric_jacobian<2, 2>(
-          [&](const Vec2& change) -> std::optional<Vec2> {
-            Vec2 out;
-            if (!lens.distort(x + change, &out)) return std::nullopt;
-            return out;
-          },
-          Vec2::Constant(1e-4));
-      EXPECT_LT(test::disagreement(J, by_x, 1e-14), 1) << x.transpose();
-    }
-  }
+  for (const Distortion<double>& lens : camera_lenses()) expect_derivatives_of_the_model(lens);
+  for (const BrownDistortion<double>& lens : brown_lenses()) expect_derivatives_of_the_model(lens);
 }
 
 TEST(Distortion, UndistortIsTheInverse) {
-  for (const BrownDistortion<double>& lens : brown_lenses()) {
-    for (const Vec2& x : shown_points()) {
+  for (const Vec2& x : shown_points()) {
+    for (const Distortion<double>& lens : camera_lenses()) {
+      Vec2 x_d;
+      Distortion<double>::Undistorted back;
+      ASSERT_TRUE(lens.distort(x, &x_d));
+      ASSERT_TRUE(lens.undistort(x_d, &back));
+      EXPECT_LT((back.x - x).norm(), 1e-12);
+    }
+    for (const BrownDistortion<double>& lens : brown_lenses()) {
       Vec2 x_d, back;
       ASSERT_TRUE(lens.distort(x, &x_d));
       ASSERT_TRUE(lens.undistort(x_d, 1e-13, &back));
