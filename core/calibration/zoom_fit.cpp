@@ -41,7 +41,7 @@ bool belong_together(const ZoomFit& fit, const ZoomFitOptions& options, double w
   return false;
 }
 
-// Two visits of one reading must agree in focal length, within six sigmas of lens repeatability and
+// Two dwells at one reading must agree in focal length, within six sigmas of lens repeatability and
 // calibrations.
 bool comes_back(double reading, const std::array<double, 2>& log_f,
                 const std::array<double, 2>& variance, double repeatability, std::string* error) {

@@ -18,7 +18,7 @@ constexpr const char* kUndetermined =
     "the calibrations leave what their readings share undetermined";
 constexpr int kFirstCentre = static_cast<int>(ZoomQuantity::kCentreU);  // and the one after it
 
-// Prior covariance of the nodes' values. It includes the lens's repeatability at each visit.
+// Prior covariance of the nodes' values. It includes the lens's repeatability at each dwell.
 Eigen::MatrixXd process_covariance(const ZoomCurve::Content& content, int quantity) {
   const ZoomSmoothness& smoothness = content.smoothness[static_cast<std::size_t>(quantity)];
   const double first = content.reading[0];
@@ -26,7 +26,7 @@ Eigen::MatrixXd process_covariance(const ZoomCurve::Content& content, int quanti
   const auto position = [&](int node) {
     return (content.reading[static_cast<std::size_t>(node)] - first) / (last - first);
   };
-  // Two visits of one reading get a tiny variance between them, else rounding makes K singular. It
+  // Two dwells at one reading get a tiny variance between them, else rounding makes K singular. It
   // is hundredths of a pixel.
   const double apart = quantity == 0 ? 1e-5 : 1e-4;
   Eigen::MatrixXd K(content.nodes, content.nodes);

@@ -4,7 +4,7 @@
 //   log f = s + delta(s) + eps                        eps: how the lens came to rest this time
 //   kappa: distortion in the corner (core/model/lens/zoom_law.h) at log f = s + delta(s)
 //   c: optical centre from the image's middle, px
-// With eps, hold = 1 keeps kappa, hold = 0 keeps the distortion's terms. Beyond the ends x is
+// Under eps, hold = 1 keeps kappa, hold = 0 keeps the distortion's terms. Beyond the ends x is
 // constant. Linear in the control points. The constructor allocates.
 
 #include <algorithm>
@@ -27,8 +27,8 @@ class LensCurve : public CubicSpline<kLensQuantityCount, LensCurve> {
 
   LensCurve() = default;
 
-  // Over log f from first to last, in segments of at most `spacing`. All points are those of
-  // `camera`, apart from its f.
+  // Over log f from first to last, in segments of at most `spacing`. Each control point: delta 0,
+  // kappa and centre of `camera`.
   LensCurve(const Camera<double>& camera, double first, double last, double spacing)
       : CubicSpline(even_knots(first, last, spacing)),
         width_(camera.width),
@@ -60,8 +60,8 @@ class LensCurve : public CubicSpline<kLensQuantityCount, LensCurve> {
   // Weights at s, clamped to the curve's range.
   [[nodiscard]] Basis basis_at(double s) const { return basis(std::clamp(s, begin_s(), end_s())); }
 
-  // The camera for given quantities; uses only this lens's shape. J_*: d camera / d x, / d eps,
-  // / d hold.
+  // The camera for given quantities; uses only image size and aspect of this object. J_*: d camera
+  // / d x, / d eps, / d hold.
   struct Jacobians {
     Matrix<double, kCameraParameterCount, kLensQuantityCount> J_x;
     CameraColumn<double> J_eps;

@@ -1,10 +1,10 @@
 #pragma once
 // ZoomNodes: the calibrations of a camera that zooms, as they come. The first one stands alone;
 // from the second reading on they are the nodes of a zoom curve (core/calibration/zoom_fit.h). Each
-// dwell between two zoom movements is a visit with a node of its own, which later calibrations of
-// the same visit sharpen. A calibration is added only if line delay, axes and clock offset agree
-// with the others within chance. A new connection has another clock offset: that of the nodes is
-// ignored until a calibration is added. Pure; allocates. One thread.
+// dwell between two zoom movements has a node of its own, which later calibrations of the same
+// dwell sharpen. A calibration is added only if line delay, axes and clock offset agree with the
+// others within chance. A new connection has another clock offset: that of the nodes is ignored
+// until a calibration is added. Pure; allocates. One thread.
 
 #include <optional>
 #include <string>
@@ -34,14 +34,14 @@ class ZoomNodes {
 
   [[nodiscard]] const ZoomCurve& curve() const { return curve_; }
   [[nodiscard]] bool empty() const { return curve_.empty() && !first_; }
-  // Whether this visit has a node already.
+  // Whether this dwell has a node already.
   [[nodiscard]] bool has_visit() const { return visited_; }
   [[nodiscard]] bool clock_is_known() const { return clock_is_known_; }
 
   void leave();  // the zoom has moved
   void clock_began_anew() { clock_is_known_ = false; }
 
-  // alone: from the data of this visit, none of which was added before; its zoom is set. options:
+  // alone: from the data of this dwell, none of which was added before; its zoom is set. options:
   // the priors that went into it. False, with one line in *error: it does not belong to this
   // camera, or makes no curve.
   [[nodiscard]] bool add(const Calibration& alone, ZoomFitOptions options, ZoomAddition* addition,

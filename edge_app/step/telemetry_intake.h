@@ -1,7 +1,8 @@
 #pragma once
 // TelemetryIntake: pan/tilt samples as they come, with the time of their clock (capture_clock.h) or
-// of their poll, in the buffer that frames ask (telemetry_buffer.h). Begins anew when the clock
-// does. A sample whose poll stalled is left out. Fixed memory; no allocation. One thread.
+// of their poll, in a buffer that frames query (telemetry_buffer.h). It is emptied when the
+// connection or the clock restarts, or the times begin to be of the other kind. Fixed memory; no
+// allocation. One thread.
 
 #include <optional>
 
@@ -19,7 +20,9 @@ struct TelemetryIntakeOptions {
   // Its period_sigma_s applies to filtered times only.
   TelemetryNoise noise;
   TelemetryLimits limits;
-  bool leave_out_stalled = false;  // samples may have waited before they were received
+  // True: samples of stalled polls are left out, as nobody knows when they were true, unless a
+  // locked clock tells it.
+  bool leave_out_stalled = false;
 };
 
 class TelemetryIntake {

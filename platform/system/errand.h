@@ -1,8 +1,8 @@
 #pragma once
-// Errand: one call at a time that blocks for as long as it likes and cannot be interrupted, such as
-// the system's look-up of a name, on a thread of its own. The owner waits for descriptor() as long
-// as it wants, and may go away meanwhile. So the call must own what it uses. Thread: niced,
-// detached, with a small stack. One thread at a time.
+// Errand: runs a call that may block for long and cannot be interrupted, such as the system's
+// look-up of a name, on a thread of its own; one call at a time. The owner waits for descriptor()
+// as long as it wants, and may go away meanwhile. So the call must own what it uses. Thread: niced,
+// detached, with a small stack. Used by one thread at a time.
 
 #include <atomic>
 #include <functional>

@@ -1,7 +1,8 @@
 #pragma once
-// NameLookup: the addresses of a host, by getaddrinfo(), which nothing can interrupt and which takes
-// minutes if a name server does not answer. Here it is an Errand: the owner waits for it with a
-// deadline of its own, and may go away. Numeric addresses need no thread. One thread at a time.
+// NameLookup: the addresses of a host, by getaddrinfo(), which nothing can interrupt and which
+// takes minutes if a name server does not answer. Here it is an Errand: the owner waits for it with
+// a deadline of its own, and may go away. Numeric addresses need no thread. Used by one thread at a
+// time.
 
 #include <sys/socket.h>
 
@@ -28,8 +29,7 @@ class NameLookup {
   NameLookup(std::string host, std::string port, int socket_type)
       : host_(std::move(host)), port_(std::move(port)), socket_type_(socket_type) {}
 
-  // Begins a look-up; if the last one was not taken, goes on with that. False: there can be no
-  // thread.
+  // Begins a look-up, or goes on with one that was not taken. False: no thread could be started.
   [[nodiscard]] bool begin();
   [[nodiscard]] bool is_over() const { return errand_.is_over(); }
   // Readable when it is over; negative: it needed no thread.

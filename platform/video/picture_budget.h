@@ -1,8 +1,8 @@
 #pragma once
 // PictureBudget: bounds what a decoder of live H.264 or H.265 keeps. A peer may claim 16 reference
 // pictures of the largest size; cameras use one to four. A decoder gets memory for a picture only
-// if all others that it keeps take at most one picture more than kMost. Pictures that were given
-// out are their users'. One thread at a time; outlives the decoder.
+// while those it keeps take at most kMost plus that picture's size. A picture that was given out
+// counts only as long as the decoder keeps it, too. One thread at a time; outlives the decoder.
 
 #include <cstdint>
 #include <utility>

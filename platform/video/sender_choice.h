@@ -2,9 +2,9 @@
 // SenderChoice: whose packets of plain RTP are the video, where the description names no sender's
 // address: anyone can send to an open port or to a group.
 //
-//   on trial  one sender, an address with its SSRC, is followed: the first that comes. If none of
-//             its pictures can be decoded within timeout_s, doubled at each further trial, and
-//             others send, the one of them with the fewest trials is next.
+//   on trial  one sender (address and SSRC) is followed: first the one that comes first. After
+//             timeout_s (doubled at each further trial of it) without a decodable picture, if
+//             others send, the least tried of them is next.
 //   kept      once a picture is decoded, for as long as packets come from its address without a
 //             pause of timeout_s. A new SSRC at that address is StreamFilter's matter.
 //
@@ -31,7 +31,7 @@ class SenderChoice {
   explicit SenderChoice(double timeout_s) : timeout_s_(timeout_s) {}
 
   // At the start of a connection. payload_type < 0: any. source: the SSRC that the description
-  // names; others are foreign. by_address: it names no address either.
+  // names; others are foreign. by_address: no address is named, so this class chooses one.
   void begin(int payload_type, std::optional<std::uint32_t> source, bool by_address, double now_s);
   // True if this packet, RTP or RTCP, is to be taken.
   [[nodiscard]] bool take(const sockaddr_storage& from, const std::uint8_t* data, std::size_t size,
@@ -39,7 +39,7 @@ class SenderChoice {
   // True if another sender is to be tried, on a new connection; *error says so.
   [[nodiscard]] bool trial_is_over(double now_s, std::string* error) const;
 
-  // Names the sender of a connection; changes with begin().
+  // Number of the trial, for keep(). Each begin() counts on.
   [[nodiscard]] int trial() const;
   // A picture of that trial was decoded.
   void keep(int trial);

@@ -2,7 +2,7 @@
 // The kinds of distortion: where a lens shows the normalised direction x = (d_1, d_2) / d_3.
 //   RadialDistortion   x_d = x (1 + k |x|^2)                      PTCEE 28; inverse in closed form
 //   BrownDistortion    OpenCV's k1 k2 p1 p2                       inverse by Newton's method
-// A kind is a group of kCount terms: operator[] counts them, kNames and kOrders say what each is.
+// A kind is a group of kCount terms: [i] is term i, kNames[i] its name, kOrders[i] its order.
 // A term of order n goes with f^n while the lens zooms (zoom_law.h).
 // distort() and undistort() fail beyond the radius at which the radial terms turn back.
 // Outputs are written on success only. Pure; no allocation. Derivation: docs/derivations.md.
@@ -97,7 +97,7 @@ struct RadialDistortion {
     [[nodiscard]] Matrix2<S> J_x_xd() const {
       return m * Matrix2<S>::Identity() + S(2) * radial * dm_dq * x_d * x_d.transpose();
     }
-    // d y / d terms of what follows from x
+    // d y / d terms at a fixed x_d, for a y(x) with the Jacobian J_y_x.
     template <int kRows>
     [[nodiscard]] Matrix<S, kRows, kCount> by_terms(const Matrix<S, kRows, 2>& J_y_x) const {
       return J_y_x * x_d * (dm_dq * x_d.squaredNorm());
@@ -168,7 +168,7 @@ struct BrownDistortion {
     Vector2<S> shown;
     Matrix2<S> J;
     for (int step = 0; step < kSteps; ++step) {
-      // Where the radial terms turn back, it continues from half as far.
+      // An iterate beyond the radius at which the radial terms turn back is halved.
       if (!distort(at, &shown, &J)) {
         at *= S(0.5);
         continue;

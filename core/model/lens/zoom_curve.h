@@ -5,8 +5,8 @@
 //   y_j(z) = level_j + Gaussian process in x with the covariance of ZoomSmoothness
 // Line delay, axes, scales, aspect and clock offset are the same at all readings
 // (kSharedParameters). A lens does not return exactly: each movement offsets log f by eps ~ N(0,
-// repeatability^2), at a node and at use. A node between dwells (is_between) is y itself, as
-// movements of the zoom showed it.
+// repeatability^2). A dwell's node has its eps in its value; at() has repeatability^2 in its
+// covariance. A node between dwells (is_between) was seen while the lens moved: no eps.
 // Made by core/calibration/zoom_fit.h. Fixed memory; no allocation.
 
 #include <Eigen/Core>
@@ -27,8 +27,8 @@ inline constexpr std::array<Parameter, 9> kSharedParameters = {
     Parameter::kPanScale, Parameter::kTiltScale, Parameter::kClockOffset};
 inline constexpr int kSharedCount = static_cast<int>(kSharedParameters.size());
 
-// Covariance of the process y_j. L, S, q are the members, in the unit of the quantity; x is 0 to 1
-// over the nodes:
+// Covariance of the process y_j. L = level_sigma, S = slope_sigma, q = roughness, in the unit of
+// the quantity; x is 0 to 1 over the nodes:
 //   K(x, x') = L^2 + S^2 (x - 1/2)(x' - 1/2) + q^2 W(x + 1, x' + 1),   W(s, t) = m^2 (3 M - m) / 6,
 //   m, M = min, max(s, t)
 // W is that of a twice integrated random walk (Wahba 1978). Its mean is a cubic spline. Its
@@ -58,16 +58,16 @@ class ZoomCurve {
   struct Content {
     int nodes = 0;
     std::array<double, kMaxNodes> reading{};   // not decreasing; first and last differ
-    std::array<bool, kMaxNodes> is_between{};  // without a visit: the value has no eps
+    std::array<bool, kMaxNodes> is_between{};  // seen in a movement: the value has no eps
     std::array<double, kZoomQuantityCount> level{};
     std::array<ZoomSmoothness, kZoomQuantityCount> smoothness;
     double repeatability = 0;  // sigma of log f after a movement
     Calibration shared;        // its image size and shared parameters count
-    // Node by node the quantities minus their level, with eps of that visit.
+    // Node by node the quantities minus their level, with its dwell's eps.
     Bounded<kZoomQuantityCount * kMaxNodes, 1> value;
     Bounded<kMaxSize, kMaxSize> covariance;  // of value, then the shared parameters
     // For each quantity: inverse covariance of the process at the nodes, with repeatability at
-    // visits.
+    // dwells.
     std::array<Bounded<kMaxNodes, kMaxNodes>, kZoomQuantityCount> inverse;
   };
 
@@ -87,7 +87,7 @@ class ZoomCurve {
   }
 
   // The calibration after a movement to this reading, with its zoom set. False for an empty curve,
-  // and for a reading that is not finite or farther beyond the nodes than the nodes' span.
+  // and for a reading that is not finite or farther beyond an end than the two ends are apart.
   [[nodiscard]] bool at(double reading, Calibration* calibration) const {
     if (empty() || !std::isfinite(reading)) return false;
     const double x = position(reading);
@@ -126,8 +126,8 @@ class ZoomCurve {
     return true;
   }
 
-  // The calibration of a node, 0 to content().nodes - 1, as it was at that visit. A node between
-  // visits has no eps.
+  // The calibration of a node, 0 to content().nodes - 1, as it was in its dwell. A node between
+  // dwells has no eps.
   [[nodiscard]] Calibration node(int i) const {
     Calibration calibration;
     const int first = row(i, 0);

@@ -1,5 +1,5 @@
 #pragma once
-// How a camera goes with its focal length while the lens zooms. The only owner of that law:
+// How a camera's parameters change with its focal length. The only owner of that law:
 //   term of order n = kappa (f / R)^n      R: half the image's diagonal, px
 // kappa is the term's distortion in the corner. It stays while f changes, and so do aspect and
 // optical centre. ZoomQuantity numbers what describes a lens at one focal length.
@@ -78,7 +78,7 @@ template <class S>
   return out;
 }
 
-// What a term changes by if its kappa changes by 1.
+// d term / d kappa = (f / R)^n, of each term
 template <class S>
 [[nodiscard]] CornerDistortion<S> corner_unit(const Camera<S>& camera) {
   return distortion_by_factor<S>(camera.focal_length /
@@ -141,8 +141,7 @@ template <class S, int kRows>
   return out;
 }
 
-// Converts columns by a zoomed camera, which has `factor` times the focal length, to columns by the
-// camera before.
+// In place: d y / d (camera zoomed by `factor`) becomes d y / d (camera before).
 template <class Derived>
 void refer_to_unzoomed(const typename Derived::Scalar& factor,
                        Eigen::MatrixBase<Derived>* J_camera) {

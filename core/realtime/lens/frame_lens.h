@@ -16,8 +16,8 @@ struct FrameLens {
   // False: as far as readings show, the lens has not moved since the previous frame.
   bool moves = false;
   // Slopes along the curve: d distortion in the corner (1) and d optical centre (px) per unit of
-  // log f. Both are taken at the focal length that the frame shows, which a coarse reading does not
-  // have.
+  // log f. They carry distortion and centre on from the reading's log f to the frame's, as a coarse
+  // reading is off.
   CornerDistortion<double> corner_by_zoom = CornerDistortion<double>::Zero();
   Vector2<double> centre_by_zoom = Vector2<double>::Zero();
 };

@@ -27,10 +27,12 @@ namespace alidade {
 struct LensFollowerOptions {
   LensTrackOptions track;
   ReadingBeliefOptions belief;
-  int frames_at_rest = 3;  // >= 1; frames in a row without a rate or a moving reading until at rest
+  // >= 1; the lens is at rest after so many frames in a row without a rate or a moving reading.
+  int frames_at_rest = 3;
   double resting_sigmas = 4;  // sigmas, > 0; a smaller rate counts as none
-  int frames_lost_for_good =
-      50;  // >= 1; frames lost at a resting reading until landmarks are another lens's
+  // >= 1; after so many lost frames in a row the map is taken to be another lens's, once the
+  // reading rests.
+  int frames_lost_for_good = 50;
   // Uncertainty without a reading, one standard deviation per unit of log f from the latest
   // reading, >= 0:
   double distortion_change = 0.02;  // of the corner's distance
@@ -64,7 +66,7 @@ class LensFollower {
            (reading_->moves || reading_->calibration.camera.focal_length != focal_length);
   }
 
-  // At time_s the lens was at rest with this focal length (px).
+  // Begins to follow. At time_s the lens was still at rest, with this focal length (px).
   void follow(double time_s, double focal_length);
   // The lens is the map's after all.
   void give_up();
@@ -96,8 +98,8 @@ class LensFollower {
   [[nodiscard]] bool is_known(double time_s) const {
     return reading_.has_value() || is_young(time_s);
   }
-  // Updates *answer (the latest one's calibration) for an answer without landmarks. camera: from
-  // expect_after_last().
+  // *answer: in, the latest answer's calibration; out, this frame's if no landmarks hold. camera:
+  // from expect_after_last().
   void answer_unseen(double time_s, const LensScale& scale, const Camera<double>& camera,
                      Calibration* answer) const;
 
@@ -124,12 +126,12 @@ class LensFollower {
                                    const LensScale& scale, double phi, double variance,
                                    const Sensitivity<1>& sensitivity) const;
 
-  // Variances of distortion and centre that are not shared with the map's zoom: the curve's at this
-  // zoom, or at zooms where landmarks were made. They are errors of their own, there and here. In
-  // the map's columns.
+  // Variances of distortion and centre beyond what is shared with the map's lens: the curve's at
+  // this zoom or at a zoom where landmarks held, whichever is larger. Each zoom has errors of its
+  // own. In the map's columns.
   [[nodiscard]] ParameterDirection unshared(const LensScale& scale) const;
 
-  // From now on phi is in the map.
+  // phi was moved into the map: log f grows by it, and phi counts from 0.
   void move(double phi) { track_.move(phi); }
 
  private:

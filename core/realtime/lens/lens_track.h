@@ -6,8 +6,9 @@
 // the previous state, extrapolated:
 //   log f' = log f + rate dt,   rate' = rate
 // Both are driven by an acceleration that is constant between two frames and white from frame to
-// frame. At rest l is learnt once, as landmarks of neighbouring frames have the same error
-// (variance_inflation(), covariance.h). Fixed memory; no allocation. One thread.
+// frame. At rest the first frame counts fully. Later ones count less, as neighbouring frames share
+// their landmarks' errors (variance_inflation(), covariance.h); their rate is taken as 0, not
+// learnt. Fixed memory; no allocation. One thread.
 
 #include <cmath>
 
@@ -54,7 +55,7 @@ class LensTrack {
   [[nodiscard]] State predicted(double time_s, bool moves) const;
   // Takes the solution of a frame with landmarks, whose prior was `predicted`.
   void learn(double time_s, bool moves, const State& predicted, const State& solved);
-  // From now on phi is in the map.
+  // phi was moved into the map: log f grows by it, and phi counts from 0.
   void move(double phi) { state_.value[0] += phi; }
 
   [[nodiscard]] const State& state() const { return state_; }

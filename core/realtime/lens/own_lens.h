@@ -11,15 +11,16 @@ namespace alidade {
 // Prior of the frame's own lens l = (log f, its rate in 1/s), at phi = 0, without its landmarks.
 // Used if the lens has moved since the map was made:
 //   found - predicted + s phi = J (...) + z (dl_0 + t dl_1) + noise,   z = d u / d log f
-// l is eliminated first. The offset has absorbed the calibration's errors at the map's zoom (a
-// centre error of c px as c / f); at another zoom they differ, so the test for a contradiction
-// allows for them.
+// s, t, J (...): see orientation_solve.h; dl: the correction of l. l is eliminated first.
+// The map's offset has learnt the calibration's errors at the map's zoom (a centre error of c px as
+// c / f). At this zoom their effect is another, and there are own_variances: both widen the test
+// for a contradiction.
 struct ZoomPrior {
   Vector2<double> value = Vector2<double>::Zero();  // expected minus predicted
   Matrix2<double> covariance = Matrix2<double>::Identity();
   Sensitivity<2> sensitivity = Sensitivity<2>::Zero();
-  // Variances of the calibration's errors at this zoom that it does not share with the map's lens.
-  // In the map's columns.
+  // Variances of the calibration's errors at this zoom, taken as independent of those of the map's
+  // lens. In the map's columns.
   ParameterDirection own_variances = ParameterDirection::Zero();
 };
 
@@ -29,8 +30,8 @@ struct SolvedZoom {
   Matrix2<double> covariance = Matrix2<double>::Zero();
   Sensitivity<2> sensitivity = Sensitivity<2>::Zero();
   Vector2<double> by_lens = Vector2<double>::Zero();  // change of correction per unit of phi
-  // rad^2, of the innovation, from errors of the calibration at this zoom, which the offset has not
-  // learnt.
+  // rad^2; the part of the innovation's covariance that the calibration's errors cause at this
+  // zoom: the offset has not learnt them.
   Matrix2<double> innovation_by_calibration = Matrix2<double>::Zero();
 };
 

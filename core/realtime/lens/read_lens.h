@@ -1,6 +1,6 @@
 #pragma once
-// ReadLens: the lens that OE mode is told for each frame: the reading's by the zoom curve. If that
-// is not believed (reading_belief.h), it is the curve's at the focal length that landmarks showed.
+// ReadLens: the lens that OE mode is told for each frame: the zoom curve's at the reading or, if
+// that is not believed (reading_belief.h), at the focal length that landmarks showed.
 // Order of calls for a frame:
 //   begin_frame()   its time
 //   look_up()       the lens to tell, or as_found() where there are no readings

@@ -1,7 +1,7 @@
 #pragma once
 // ReadingJudge: whether a zoom reading is believed. Decided here only, from the lens that landmarks
-// showed; all others ask. Each judge has one source: LensFollower's is the lens that OE mode is
-// told, ReadLens's the reading itself.
+// showed; all others ask. There are two judges: ReadLens's judges the reading, LensFollower's the
+// lens that OE mode was told.
 // Fixed memory; no allocation. One thread.
 
 #include <algorithm>
@@ -12,15 +12,17 @@ namespace alidade {
 enum class ReadingBelief {
   kBelieved,  // no landmarks lately, or none that speak against it
   kExcluded,  // the latest landmarks that held show another focal length
-  kJumped     // farther from the lens that they showed than a lens moves in the time since
+  kJumped     // farther from what landmarks last showed than any lens can have moved since
 };
 
 struct ReadingBeliefOptions {
   // Standard deviations of reading and landmarks together, > 0; beyond it the reading is wrong.
   double excluded_sigmas = 5;
-  double longest_s = 0.5;      // s, > 0; for so long the lens that landmarks showed counts
-  double fastest = 3;          // 1/s, > 0, of log f: 20 times in a second; no lens is faster
-  double largest_sigma = 0.1;  // of log f, > 0; between two readings far apart it may be anything
+  double longest_s = 0.5;  // s, > 0; for so long the lens that landmarks showed counts
+  double fastest = 3;      // 1/s, > 0, of log f: 20 times in a second; no lens is faster
+  // Of log f, > 0. For kJumped a reading's sigma counts as at most this, as it grows without bound
+  // between readings far apart.
+  double largest_sigma = 0.1;
 
   // False if a value is invalid. *error, if not null, then says which in one line.
   [[nodiscard]] bool validate(const char** error = nullptr) const {
@@ -47,7 +49,7 @@ class ReadingJudge {
 
   // age_s: since landmarks last showed the lens. True if that lens still counts.
   [[nodiscard]] bool remembers(double age_s) const { return age_s < options_.longest_s; }
-  // Of the reading of a frame that is age_s later than that.
+  // Of a frame's reading, age_s after landmarks last showed the lens.
   [[nodiscard]] ReadingBelief belief(double age_s) const {
     return excluded_ && remembers(age_s) ? ReadingBelief::kExcluded : ReadingBelief::kBelieved;
   }

@@ -1,8 +1,8 @@
 #pragma once
 // ZoomLookup: the lens's zoom at any time, from its latest readings, and the zoom curve's
-// calibration for it. Between two readings the zoom is interpolated. After the newest one a lens
-// that moved may go on or have stopped, so it is taken to go on, with half of the way as standard
-// deviation. Fixed memory; allocates nothing.
+// calibration for it. Between two readings the zoom is interpolated. Beyond the newest one a moving
+// lens is taken to go on at its rate; as it may have stopped, sigma includes half the way since.
+// Fixed memory; allocates nothing.
 
 #include <array>
 #include <cstddef>
@@ -22,8 +22,8 @@ class ZoomLookup {
   [[nodiscard]] bool stands_at(double zoom, double tolerance, double time_s) const;
 
   // The relative change of focal length between the readings around the time and the one after
-  // them, by the curve. A lens that begins to move has left its zoom by less than a tolerance at
-  // first. 0: no change, or the curve does not say.
+  // them, by the curve. Needed as a lens that begins to move stays within the tolerance at first.
+  // 0: no change, or the curve does not say.
   [[nodiscard]] double change_about(const ZoomCurve& curve, double time_s) const;
 
   // The calibration for PT mode, for a frame with this telemetry time of its middle row, whose rows
@@ -61,8 +61,8 @@ class ZoomLookup {
   std::size_t count_ = 0;  // of all readings ever added
 };
 
-// Standard deviation of log f up to which landmarks are looked for by a zoom curve while the camera
-// can still calibrate itself at this reading: less than 7 px at the border of 1280.
+// Up to this sigma of log f a zoom curve is good enough to begin landmarks where the camera could
+// calibrate itself instead: less than 7 px at the border of an image 1280 px wide.
 inline constexpr double kSharpFocalLength = 0.01;
 // The same where the camera cannot calibrate itself. Beyond it the first landmarks do not hold
 // through a turn.

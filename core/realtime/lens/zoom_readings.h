@@ -17,14 +17,14 @@ class ZoomReadings {
 
   // time_s: s, when it was received. reading: finite. True if the zoom is another one than before.
   bool take(double time_s, double reading);
-  // The reading taken last was true at this telemetry time (s).
+  // Tells the telemetry time (s) of the reading taken last.
   void place(double time_s) {
     if (zoom_) lookup_.add(time_s, *zoom_);
   }
   [[nodiscard]] const std::optional<double>& told() const { return told_; }  // as last reported
   [[nodiscard]] const std::optional<double>& zoom() const { return zoom_; }  // without jitter
 
-  // A calibration is adopted. If it has no zoom, it is taken to be made at the present one.
+  // Call when a calibration is adopted: one without a zoom counts as made at the present one.
   void note_adoption() { zoom_at_adoption_ = zoom_; }
   // True if the present zoom is the calibration's, or one of the two is unknown.
   [[nodiscard]] bool fits(const std::optional<double>& calibrated) const;

@@ -4,9 +4,10 @@
 // two.
 //   the camera at phi: zoomed by phi (zoom_law.h); a distortion that is exact stays
 //   d / d phi = S a of all that has a Sensitivity S;  a: by_zoom() of the camera, 0 where exact
-// Errors: those of the calibration are a phi + e; e, of covariance `others`, is independent of what
-// follows. (g, phi) have their own noise plus their sensitivity times e. Landmarks and motions are
-// stored for phi = 0; S a is their change with phi.
+// The calibration's error is a phi + e. g and phi are known up to a noise of their own plus their
+// sensitivity times e; e, of covariance `others`, is independent of that noise and of the noise of
+// all measurements. Landmarks and motions are stored at phi = 0; they change by S a per unit of
+// phi.
 // Once the lens has moved (lens_track.h), phi is the scale of the map's directions. A frame's
 // camera then has its own f times exp(phi); see LensColumns. Plain values; no allocation.
 
@@ -43,7 +44,7 @@ struct LensScale {
     return at(calibration, value, variance, sensitivity);
   }
 
-  // Sets the column of f so that S a = 0: d / d phi is then not in the sensitivity.
+  // Replaces the column of f so that S a = 0: the change with phi is kept apart.
   template <int kRows>
   void make_independent(Sensitivity<kRows>* sensitivity_of_it) const {
     constexpr int f = camera_column::kFocalLength;
@@ -61,10 +62,10 @@ struct LensScale {
   [[nodiscard]] ParameterDirection move(double phi, Camera<double>* camera) const;
 };
 
-// Converts parameter columns of a frame's own lens to the map's, with the map's lens a:
-//   change of log f at constant distortion in the corner    a: in the column of f
-//   change of a term's distortion in the corner             of_map: in the column of the term
-// All other columns are the same for both. d / d phi stays S a.
+// Converts columns by the frame's camera to columns by the map's, and back.
+//   a step of log f at constant kappa    changes the frame's camera by `along`, the map's by a
+//   a step of one kappa                  changes the frame's term by of_map times the map's change
+// All other columns are the same for both. d / d phi stays S a, by the map's columns.
 struct LensColumns {
   // camera: the frame's.
   LensColumns(const LensScale& lens, const Camera<double>& camera);

@@ -1,7 +1,8 @@
 #pragma once
 // Which landmarks of a frame agree on a motion. Two steps:
-//   robust_start()   from the median of the landmarks' own angles, by weights that fall with the
-//                    residual, while the scale shrinks to what the residuals show
+//   robust_start()   starts at the median of the angles that each landmark alone gives; then
+//                    weights fall with the residual, while the scale shrinks to what the residuals
+//                    show
 //   gate()           those within the gate count fully, the others not at all
 // Internal to orientation_solve.cpp. No allocation.
 
@@ -36,8 +37,9 @@ void find_squares(const OrientationProblem& problem, const MotionAndLens& x, Squ
 [[nodiscard]] bool gate(const OrientationProblem& problem, const ScaledPrior& scaled,
                         const SolveLimits& limits, FoundLandmark* landmarks, Fit* fit);
 
-// Factor for the landmarks' covariances: by how much the mean residuals of neighbours exceed
-// theirs. 1 if the residuals are independent. width, height: px, of the image.
+// Factor for the landmarks' covariances: by how much the squares of residuals averaged over
+// neighbours exceed what independent errors leave. About 1 if the errors are independent; 1 if too
+// few neighbourhoods have landmarks. width, height: px, of the image.
 [[nodiscard]] double neighbours_inflation(const OrientationProblem& problem,
                                           const FoundLandmark* landmarks, double width,
                                           double height, const MotionAndLens& x);

@@ -17,7 +17,7 @@ struct FromLandmarks {
   WithoutAngles own;
   Matrix2<double> prior_offset =
       Matrix2<double>::Zero();  // rad^2, of g: its prior's and the landmarks' common error
-  ZoomRows zoom;                // if the frame has its own lens, as is the next
+  ZoomRows zoom;                // this and the next: only if the frame has its own lens
   Sensitivity<2> zoom_of_sensitivities = Sensitivity<2>::Zero();
   // Change of the right-hand side of x with the parameters; right_of_own: telemetry's rates
   // included, only with a learnt lens.
@@ -47,8 +47,8 @@ struct Posterior {
                                               Matrix2<double>* shared);
 
 // Telemetry's angles against the landmarks'. Needs telemetry. Writes the innovation, its covariance
-// and the contradiction. False if they exclude each other; *out then has what is unexpected as
-// innovation.
+// and the contradiction. False: they exclude each other; out->innovation then lacks what phi
+// explains.
 [[nodiscard]] bool agree_with_telemetry(const Given& given, const FromLandmarks& landmarks,
                                         double max_contradiction, SolvedMotion* out);
 

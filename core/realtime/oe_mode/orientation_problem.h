@@ -35,8 +35,8 @@ struct LensRow {
   double b = 0;
 };
 
-// Rows of the frame's own lens l, prior included:  N l + C' x - c phi = b.  Without inflation of
-// the landmarks' covariances.
+// Rows of the frame's own lens l, prior included:  N l + C' x - c phi = b.  Landmarks count
+// uninflated; instead the prior's information is multiplied by the inflation.
 struct ZoomRows {
   Matrix2<double> inverse = Matrix2<double>::Zero();  // of N
   Matrix<double, 6, 2> C = Matrix<double, 6, 2>::Zero();
@@ -208,8 +208,8 @@ class OrientationProblem {
     return rows;
   }
 
-  // Residual of landmark i at these unknowns. A template parameter, so that loops over all
-  // landmarks do not branch.
+  // Residual of landmark i at these values. Which unknowns it depends on is a template parameter,
+  // so that loops over all landmarks do not branch.
   template <Unknowns unknowns>
   [[nodiscard]] Vector2<double> left(int i, const MotionAndLens& at) const {
     const auto of_it = static_cast<std::size_t>(i);

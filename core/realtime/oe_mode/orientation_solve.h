@@ -51,8 +51,8 @@ struct MotionPrior {
   Matrix6 motion_information = Matrix6::Zero();
   Sensitivity<6> motion_sensitivity = Sensitivity<6>::Zero();
   const LensScale* lens = nullptr;  // before this frame; null: not learnt
-  // >= 1; factor for the variance of phi from the landmarks' scale, as earlier frames said part of
-  // it.
+  // >= 1; factor for the variance of phi from this frame's landmarks, as part of their error was in
+  // earlier frames, too.
   double scale_inflation = 1;
   const ZoomPrior* zoom = nullptr;  // null: the lens is the map's. Needs `lens`.
 };
@@ -120,9 +120,9 @@ struct SolveLimits {
 // Robust: starts at the component-wise median of the landmarks' own angles. Weights fall with the
 // residual (Geman-McClure), and the scale shrinks to what the residuals show. Then those within the
 // gate count fully, the others not at all. Up to half of the landmarks may be wrong.
-// Covariance: that of the linear problem, times how much the residuals exceed theirs, one by one or
-// averaged over neighbours (a tenth of the image), which reveals common errors; plus the landmarks'
-// shared covariance, averaged with their weights.
+// Covariance: that of the linear problem, times the factor by which squares of residuals exceed
+// their covariances, single or averaged over neighbours (within a tenth of the image's width),
+// which reveals common errors; plus the landmarks' shared covariance, averaged with their weights.
 [[nodiscard]] SolveStatus solve_orientation(FoundLandmark* landmarks, int count,
                                             const MotionPrior& prior, const SolveLimits& limits,
                                             double width, double height, double half_readout_s,

@@ -7,7 +7,7 @@
 
 namespace alidade::internal {
 
-// x at phi = 0, its dependence on phi, and phi from the same sources alone.
+// x at phi = 0, its change with phi, and phi from landmarks, previous frames and rates.
 struct WithoutAngles {
   Vector6 x;
   Matrix6 covariance;
