@@ -11,8 +11,8 @@
 
 namespace alidade {
 
-EstimateReader::EstimateReader(YAML::Node root, std::string file)
-    : root_(std::move(root)), file_(std::move(file)) {}
+EstimateReader::EstimateReader(const YAML::Node& root, std::string file)
+    : root_(root), file_(std::move(file)) {}
 
 void EstimateReader::fail(const YAML::Node& node, const std::string& text) const {
   throw YamlError(file_ + ":" + std::to_string(line_of(node).value_or(1)) + ": " + text);

@@ -33,7 +33,7 @@ struct EstimateRows {
 
 class EstimateReader {
  public:
-  EstimateReader(YAML::Node root, std::string file);
+  EstimateReader(const YAML::Node& root, std::string file);
 
   [[noreturn]] void fail(const YAML::Node& node, const std::string& text) const;
   [[nodiscard]] const YAML::Node& root() const { return root_; }

@@ -14,6 +14,7 @@ double angle_resolution(const std::vector<AdjustmentTelemetry>& telemetry) {
   double resolution = 0;
   for (int axis = 0; axis < 2; ++axis) {
     std::vector<double> angles;
+    angles.reserve(telemetry.size());
     for (const auto& sample : telemetry) angles.push_back(sample.measured[axis]);
     std::sort(angles.begin(), angles.end());
     std::vector<double> steps;

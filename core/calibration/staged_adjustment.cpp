@@ -72,7 +72,7 @@ StageStatus StagedAdjustment::adjust_on_inliers(CalibrationQuality* quality) {
             "image's size right, and are all tracks from one zoom?" +
                 doubt_};
   }
-  const StageStatus status = allow_for_repetition(quality);
+  StageStatus status = allow_for_repetition(quality);
   if (!status.ok()) return status;
   allow_for_shared_errors();
   return {};

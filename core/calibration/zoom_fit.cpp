@@ -260,15 +260,15 @@ bool fit_zoom(const std::vector<Calibration>& calibrations,
   double worst_reading = 0;
   fit->chi_square = 0;
   int node = -1;
-  for (std::size_t i = 0; i < samples.size(); ++i) {
+  for (const ZoomSample& sample : samples) {
     ++node;
     while (is_between[static_cast<std::size_t>(node)]) ++node;
-    const ZoomSampleVector left = fitting.left_of(samples[i], node);
-    const double square = left.dot(samples[i].information * left);
+    const ZoomSampleVector left = fitting.left_of(sample, node);
+    const double square = left.dot(sample.information * left);
     fit->chi_square += square;
     if (square <= worst) continue;
     worst = square;
-    worst_reading = samples[i].reading;
+    worst_reading = sample.reading;
   }
   fit->degrees_of_freedom = fitting.shared_places() * (static_cast<int>(samples.size()) - 1);
   fit->node = 0;

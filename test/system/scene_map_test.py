@@ -240,7 +240,7 @@ class NoTelemetry(WithSceneMap):
         run = self.alidade("run", "-c", config)
         code, _ = run.end()
         self.assertEqual(code, 2)
-        self.assertIn("no scene map tells where the camera looks", run.error_text())
+        self.assertIn("no scene map shows where the camera looks", run.error_text())
         config = self.write_config(camera, pan_tilt=self.NONE, realtime={"mode": "OE"},
                                    scene_map={"file": str(self.folder / "none.map")})
         run = self.alidade("run", "-c", config)
