@@ -1,5 +1,6 @@
 #pragma once
-// fit_zoom(): from calibrations at some zoom readings to the ZoomCurve (core/model/lens/zoom_curve.h).
+// fit_zoom(): from calibrations at some zoom readings to the ZoomCurve
+// (core/model/lens/zoom_curve.h).
 //   1 Each calibration, without its priors, is a linear observation of focal length, distortion and
 //     optical centre at its reading, and of the parameters that all readings share.
 //   2 The likelihood chooses the curves' roughness q from a grid of factors about the usual value.

@@ -1,6 +1,6 @@
 #pragma once
-// The zoom curve (core/model/lens/zoom_curve.h) in a calibration.yaml. The file's other keys are the
-// calibration at its `zoom`.
+// The zoom curve (core/model/lens/zoom_curve.h) in a calibration.yaml. The file's other keys are
+// the calibration at its `zoom`.
 //   zoom_curve:
 //     repeatability: 0.002                        sigma of log f after a movement of the zoom
 //     smoothness: {log_focal_length: {level_sigma: ..., slope_sigma: ..., roughness: ...}, ...}

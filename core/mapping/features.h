@@ -2,10 +2,10 @@
 // FeatureDetector: SIFT features of an image, spread over it, with RootSIFT descriptors in 8 bits.
 //   descriptor   r_i = round(512 sqrt(s_i / sum s)), s SIFT's histogram. Euclidean distances of r
 //                are Hellinger distances of s (Arandjelovic, Zisserman 2012).
-//   place        in Alidade's pixels (core/model/lens/camera.h); OpenCV's are half a pixel less. OpenCV
-//                before 4.8, and later by default, places all features a quarter of a pixel off, as
-//                its doubled first image is. That is measured once on a blob at a known place and
-//                taken off.
+//   place        in Alidade's pixels (core/model/lens/camera.h); OpenCV's are half a pixel less.
+//                OpenCV before 4.8, and later by default, places all features a quarter of a pixel
+//                off, as its doubled first image is. That is measured once on a blob at a known
+//                place and taken off.
 // Batch work: allocates. One thread at a time.
 
 #include <array>

@@ -1,6 +1,6 @@
 #pragma once
-// SceneMapUpkeep's data on one picture, for scene_map_upkeep.cpp and landmark_birth.cpp alone: its pose,
-// where it shows the map's landmarks, and what was found and changed of them.
+// SceneMapUpkeep's data on one picture, for scene_map_upkeep.cpp and landmark_birth.cpp alone: its
+// pose, where it shows the map's landmarks, and what was found and changed of them.
 
 #include <cstddef>
 #include <cstdint>

@@ -1,6 +1,7 @@
 #pragma once
-// camera_of_lens(): the base camera (core/model/lens/camera.h: f, aspect, one k, centre in the middle of
-// the image) that is nearest to a lens with two focal lengths, its own centre, k1 k2 and p1 p2.
+// camera_of_lens(): the base camera (core/model/lens/camera.h: f, aspect, one k, centre in the
+// middle of the image) that is nearest to a lens with two focal lengths, its own centre, k1 k2 and
+// p1 p2.
 //   min over (f, alpha, k, R) of  sum_i |camera(R d_i) - u_i|^2   u_i: grid, d_i = lens^-1(u_i)
 // The rotation R absorbs the direction of the lens's axis; in a mount the pan and tilt axes do. For
 // k2 = p1 = p2 = 0 and a centre in the middle, k = k1 exactly. The covariance is the lens's,

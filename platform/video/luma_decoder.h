@@ -35,8 +35,8 @@ class LumaDecoder {
   };
 
   // low_delay: never hold back a picture for reordering, whatever the stream's parameter sets
-  // permit, and bound the pictures that it keeps (PictureBudget); H.264 and H.265 data must be Annex
-  // B then. A picture of more than max_pixels, counted in whole blocks, cannot be decoded.
+  // permit, and bound the pictures that it keeps (PictureBudget); H.264 and H.265 data must be
+  // Annex B then. A picture of more than max_pixels, counted in whole blocks, cannot be decoded.
   [[nodiscard]] bool open(const AVCodecParameters& parameters, bool low_delay,
                           std::int64_t max_pixels = kMostFilePixels);
 

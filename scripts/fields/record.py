@@ -2,7 +2,7 @@
 import re
 import textwrap
 
-from fields.common import JSON, ListError, between, bounds, by, clang_formatted, description, entries, flow, ros_lines, sentence
+from fields.common import JSON, ListError, between, bounds, by, clang_formatted, description, entries, flow, members_text, properties, ros_lines, sentence
 
 LIST = "edge_app/record/record_fields.yaml"
 BY = by(LIST)
@@ -84,9 +84,7 @@ def schema(field):
             parts.append(f"enum: [{', '.join(flow(word) for word in field['enum'])}]")
     parts.append(f"description: {flow(description(field))}")
     if field["type"] == "object":
-        members = ", ".join(f"{member['name']}: {{type: number" + (f", minimum: {member['minimum']}" if "minimum" in member else "") +
-                            f", description: {flow(description(member))}}}" for member in field["members"])
-        parts.append(f"properties: {{{members}}}")
+        parts.append(properties(field))
     return f"        {field['name']}: {{{', '.join(parts)}}}"
 
 
@@ -111,8 +109,7 @@ def table(fields):
         text = "; ".join(parts)
         extra = [field["more"].rstrip(".")] if "more" in field else []
         if field["type"] == "object":
-            members = "; ".join(f"`{member['name']}` ({member['unit']}): {member['says']}" for member in field["members"])
-            extra.append(f"Members: {members}. CSV: " + ", ".join(f"`{field['name']}_{member['name']}`" for member in field["members"]))
+            extra.append(f"{members_text(field)}. CSV: " + ", ".join(f"`{field['name']}_{member['name']}`" for member in field["members"]))
         if field["type"] == "array":
             columns = field["columns"]
             extra.append("CSV: " + (", ".join(f"`{column}`" for column in columns) if len(columns) <= 4 else f"`{columns[0]}` to `{columns[-1]}`"))

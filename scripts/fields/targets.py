@@ -1,7 +1,7 @@
 """Targets: what JSON writes, the OpenAPI schema, the table, the ROS message and how the ROS node reads it."""
 import textwrap
 
-from fields.common import JSON, ListError, between, bounds, by, clang_formatted, description, entries, flow, ros_lines
+from fields.common import JSON, ListError, between, bounds, by, clang_formatted, description, entries, flow, members_text, properties, ros_lines
 
 LIST = "edge_app/tracking/target_fields.yaml"
 BY = by(LIST)
@@ -74,8 +74,7 @@ def schema(field):
         told["says"] = f"{field['says']}; left out: {field['left_out_if']}"
     parts.append(f"description: {flow(description(told))}")
     if field["type"] == "object":
-        members = ", ".join(f"{member['name']}: {{type: number, description: {flow(description(member))}}}" for member in field["members"])
-        parts.append(f"properties: {{{members}}}")
+        parts.append(properties(field))
     return f"        {field['name']}: {{{', '.join(parts)}}}"
 
 
@@ -103,7 +102,7 @@ def table(fields):
             parts.append(f"`null`: {field['null_if']}")
         extra = [field["more"].rstrip(".")] if "more" in field else []
         if field["type"] == "object":
-            extra.append("Members: " + "; ".join(f"`{member['name']}` ({member['unit']}): {member['says']}" for member in field["members"]))
+            extra.append(members_text(field))
         if field["type"] == "matrix":
             extra.append(f"{field['size']} rows of {field['size']}")
         rows.append(f"| `{field['name']}` | {field.get('unit', '')} | {'. '.join(['; '.join(parts)] + extra)} |")

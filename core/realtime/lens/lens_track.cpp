@@ -61,7 +61,6 @@ void LensTrack::learn(double time_s, bool moves, const State& predicted, const S
     state_ = solved;
     // The first frame at rest still contains the movement.
     rested_ = !moves;
-    learnt_at_rest_s_ = time_s;
     return;
   }
   const double prior = predicted.covariance(0, 0);

@@ -65,7 +65,6 @@ class LensTrack {
   LensTrackOptions options_;
   bool active_ = false;
   double time_s_ = 0;
-  double learnt_at_rest_s_ = 0;
   bool rested_ = false;  // already learnt at rest since it moved
   State state_;
 };

@@ -5,10 +5,12 @@
 //   light        the sun turns once a day: descriptors change, blobs move by a part of a pixel, some things are there for hours only
 //   cars         groups of things that stand for hours in one half of a view
 //   trees        things in the right half that sway together, slowly; with `bare` nothing lasting stands there
-//   shadows      things that move by pixels in a minute, along the same path every day; with the season each hour's place moves along it
+//   shadows      things that move by pixels in a minute, along the same path every day; with the
+//                season each hour's place moves along it
 //   season       the sun of an hour comes earlier from day to day
 //   fog          hours in which next to nothing is seen
-// Matches with the map are found by descriptors, near the place that telemetry predicts. find_pose() gives the poses.
+// Matches with the map are found by descriptors, near the place that telemetry predicts.
+// find_pose() gives the poses.
 
 #include <algorithm>
 #include <array>
@@ -341,7 +343,8 @@ struct SceneDay {
 struct SceneRunOptions {
   bool upkeep = true;
   SceneMapUpkeepOptions options;
-  // Stores the map: called first with the whole map and no change, then with each change before it is applied.
+  // Stores the map: called first with the whole map and no change, then with each change before it
+  // is applied.
   // Returns the size of the store, bytes; none: it could not be stored, and the run ends.
   std::function<std::optional<std::int64_t>(const SceneMap& map, const MapChange& change)> keep;
 };

@@ -177,7 +177,8 @@ TEST(MotionCheck, TellsNothingOfAImageThatGoesItsOwnWay) {
   EXPECT_THAT(report.findings, IsEmpty());
 }
 
-// Whatever the image seems to show: the right signs, one reversed, upside down, turned by 90 degrees.
+// Whatever the image seems to show: the right signs, one reversed, upside down, turned by 90
+// degrees.
 TEST(MotionCheck, TellsNoSignsWithoutTimes) {
   std::vector<Scene> scenes = {Scene(wander), Scene(wander, {1, -1}), Scene(wander, {-1, -1}),
                                Scene(wander)};

@@ -1,4 +1,5 @@
-// Pan/tilt samples as they come: their times, what a stalled poll is worth, when a clock begins anew.
+// Pan/tilt samples as they come: their times, what a stalled poll is worth, when a clock begins
+// anew.
 
 #include "edge_app/step/telemetry_intake.h"
 

@@ -1,4 +1,5 @@
-// The lens that OE mode is told: the reading's, or the one that landmarks showed where the reading is not believed.
+// The lens that OE mode is told: the reading's, or the one that landmarks showed where the reading
+// is not believed.
 
 #include "core/realtime/lens/read_lens.h"
 

@@ -1,4 +1,5 @@
-// Whether a zoom reading is believed, after landmarks agreed with it, excluded it, or were seen too long ago.
+// Whether a zoom reading is believed, after landmarks agreed with it, excluded it, or were seen too
+// long ago.
 
 #include "core/realtime/lens/reading_belief.h"
 
