@@ -57,21 +57,31 @@ PipelineOptions pipeline_options(const Config& config, const PublishedCalibratio
 }
 
 // Null if no server is configured.
-std::unique_ptr<HttpServer> start_http(const Config& config, const HttpApiSources& sources,
-                                       ImageTap* tap) {
+std::unique_ptr<HttpServer> make_http(const Config& config, const HttpApiSources& sources,
+                                      ImageTap* tap) {
   if (!config.output.http) return nullptr;
   auto server = std::make_unique<HttpServer>(*config.output.http);
   add_api_routes(server.get(), sources);
   add_status_page(server.get(), tap);
-  const HttpServerOptions& options = *config.output.http;
+  return server;
+}
+
+// False: a signal came first.
+bool start_http(HttpServer* server, const HttpServerOptions& options, StopSignals* signals) {
   std::string error;
   if (!server->check_tls(&error)) throw CommandError(kExitUsage, error);
-  if (!server->start(&error)) throw CommandError(kExitFailed, error);
+  const auto wait = [signals](int descriptor, double timeout_s) {
+    return signals->wait(descriptor, timeout_s) != StopSignals::Event::kSignal;
+  };
+  if (!server->start(wait, &error)) {
+    if (error.empty()) return false;
+    throw CommandError(kExitFailed, error);
+  }
   spdlog::info("HTTP: listening on {}://{}/{}", options.tls ? "https" : "http", server->address(),
                !options.tokens.empty() ? fmt::format(", with {} tokens", options.tokens.size())
                : options.token.empty() ? ""
                                        : ", with a token");
-  return server;
+  return true;
 }
 
 // Null if no broker is configured.
@@ -174,7 +184,8 @@ int run_live(const RunOptions& options) {
   sources.version = ALIDADE_VERSION;
   sources.camera = video->name();
   sources.latency_measured = of_pipeline.measure_latency;
-  const auto http = start_http(config, sources, &tap);
+  const auto http = make_http(config, sources, &tap);
+  if (http && !start_http(http.get(), *config.output.http, &signals)) return kExitOk;
   if (mqtt && !mqtt->start())
     throw CommandError(kExitFailed, "the thread for MQTT cannot be started");
   if (targets) targets->start();

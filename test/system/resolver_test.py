@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""A name server that never answers: whatever `alidade` looks up the name of, SIGTERM ends it.
+"""A name server that never answers: whatever `alidade` looks up the name of, SIGTERM ends it, and so does the deadline
+of what it cannot start without.
 
 Runs itself again in namespaces of its own, where that server is the only one. A look-up there takes 150 s, longer than
 the harness waits for an end. Where such namespaces are not allowed, the exit code is 77, and ctest says "skipped".
@@ -101,6 +102,15 @@ class Resolver(SystemTest):
             with self.subTest(scheme):
                 name = f"broker-by-{scheme}"
                 self.assert_ends(name, *self.run_with(mqtt={"url": f"{scheme}://{name}.example"}))
+
+    def test_of_its_own_server(self):
+        self.assert_ends("server", *self.run_with(output={"http": "server.example:0"}))
+
+    def test_of_its_own_server_without_a_signal(self):
+        process = self.alidade(*self.run_with(output={"http": "deadline.example:0"}))
+        code, _ = process.end()
+        self.assertEqual(code, 1, process.error_text())
+        self.assertIn("HTTP: cannot listen on deadline.example:0: its name was not found within ", process.error_text())
 
 
 if __name__ == "__main__":

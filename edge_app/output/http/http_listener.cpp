@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 #include <sys/eventfd.h>
+#include <sys/socket.h>
 #include <unistd.h>
 
 #include <boost/asio/buffer.hpp>
@@ -11,6 +12,7 @@
 #include <boost/asio/steady_timer.hpp>
 #include <cerrno>
 #include <chrono>
+#include <cstring>
 #include <sstream>
 #include <system_error>
 #include <thread>
@@ -18,6 +20,7 @@
 #include <vector>
 
 #include "platform/system/clock.h"
+#include "platform/system/name_lookup.h"
 
 namespace alidade {
 namespace {
@@ -34,6 +37,7 @@ constexpr int kSendBufferBytes = 64 << 10;
 // until something is closed.
 constexpr std::chrono::milliseconds kAcceptAgain{20};
 constexpr double kSilenceS = 10;  // after a failure was logged
+constexpr double kNameDeadlineS = 5;
 
 int make_event() {
   const int descriptor = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
@@ -95,7 +99,32 @@ HttpListener::~HttpListener() {
   ::close(wake_);
 }
 
-bool HttpListener::open(std::string* address, std::string* error) {
+// False as HttpServer::start().
+bool HttpListener::find_endpoint(const HttpStartWait& wait, Tcp::endpoint* endpoint,
+                                 std::string* error) const {
+  const auto refuse = [&](const std::string& why) {
+    *error = fmt::format("HTTP: cannot listen on {}:{}: {}; give an address of this machine",
+                         options_.host, options_.port, why);
+    return false;
+  };
+  NameLookup lookup(options_.host, std::to_string(options_.port), SOCK_STREAM);
+  if (!lookup.begin()) return refuse("there can be no thread to look up its name");
+  const double deadline_s = monotonic_now_s() + kNameDeadlineS;
+  while (!lookup.is_over()) {
+    const double left_s = deadline_s - monotonic_now_s();
+    if (left_s <= 0)
+      return refuse(fmt::format("its name was not found within {:g} s", kNameDeadlineS));
+    if (!wait(lookup.descriptor(), left_s)) return false;
+  }
+  std::string why;
+  const std::vector<HostAddress> found = lookup.take(&why);
+  if (found.empty() || found.front().size > endpoint->capacity()) return refuse(why);
+  std::memcpy(endpoint->data(), found.front().get(), found.front().size);
+  endpoint->resize(found.front().size);
+  return true;
+}
+
+bool HttpListener::open(const HttpStartWait& wait, std::string* address, std::string* error) {
   if (tls_) {
     std::vector<std::string> warnings;
     if (!tls_->load(error, &warnings)) {
@@ -104,18 +133,9 @@ bool HttpListener::open(std::string* address, std::string* error) {
     }
     for (const std::string& warning : warnings) spdlog::warn("HTTP: {}", warning);
   }
-  const std::string where = fmt::format("{}:{}", options_.host, options_.port);
+  Tcp::endpoint endpoint;
+  if (!find_endpoint(wait, &endpoint, error)) return false;
   Error code;
-  Tcp::resolver resolver(network_->context);
-  const auto found =
-      resolver.resolve(options_.host, std::to_string(options_.port),
-                       Tcp::resolver::passive | Tcp::resolver::numeric_service, code);
-  if (code || found.empty()) {
-    *error = fmt::format("HTTP: cannot listen on {}: {}; give an address of this machine", where,
-                         code.message());
-    return false;
-  }
-  const Tcp::endpoint endpoint = found.begin()->endpoint();
   Tcp::acceptor& acceptor = network_->acceptor;
   acceptor.open(endpoint.protocol(), code);
   if (!code) close_on_exec(acceptor.native_handle());
@@ -124,7 +144,7 @@ bool HttpListener::open(std::string* address, std::string* error) {
   if (!code) acceptor.listen(kBacklog, code);
   if (code) {
     *error = fmt::format(
-        "HTTP: cannot listen on {}: {}{}", where, code.message(),
+        "HTTP: cannot listen on {}:{}: {}{}", options_.host, options_.port, code.message(),
         code == asio::error::address_in_use ? "; another program does, choose another port" : "");
     return false;
   }

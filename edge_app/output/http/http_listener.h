@@ -7,6 +7,7 @@
 
 #include <atomic>
 #include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
 #include <memory>
 #include <optional>
 #include <string>
@@ -27,8 +28,8 @@ class HttpListener {
   HttpListener(const HttpListener&) = delete;
   HttpListener& operator=(const HttpListener&) = delete;
 
-  // Binds and listens. *address: the address with its actual port. False with one line in *error.
-  [[nodiscard]] bool open(std::string* address, std::string* error);
+  // Binds and listens. *address: the address with its actual port. False as HttpServer::start().
+  [[nodiscard]] bool open(const HttpStartWait& wait, std::string* address, std::string* error);
 
   // Both return after stop().
   void serve_network();
@@ -45,6 +46,9 @@ class HttpListener {
  private:
   struct Network;
 
+  [[nodiscard]] bool find_endpoint(const HttpStartWait& wait,
+                                   boost::asio::ip::tcp::endpoint* endpoint,
+                                   std::string* error) const;
   void serve_some();
   void accept();
   void take(boost::asio::ip::tcp::socket socket);

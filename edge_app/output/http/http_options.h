@@ -2,6 +2,7 @@
 // Where an HttpServer listens, who may ask, and the limits for a client.
 
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -55,5 +56,9 @@ struct HttpServerOptions {
   std::optional<HttpTlsOptions> tls;
   HttpLimits limits;
 };
+
+// How a start waits for the name of its host: until the descriptor is readable, or timeout_s has
+// passed. False: give up, the program ends.
+using HttpStartWait = std::function<bool(int descriptor, double timeout_s)>;
 
 }  // namespace alidade

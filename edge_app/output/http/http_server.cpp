@@ -1,5 +1,8 @@
 #include "edge_app/output/http/http_server.h"
 
+#include <poll.h>
+
+#include <cmath>
 #include <string>
 #include <utility>
 #include <vector>
@@ -9,6 +12,17 @@
 #include "edge_app/output/http/http_tls.h"
 
 namespace alidade {
+namespace {
+
+// A signal may end it early; the start waits again until its deadline.
+bool wait_for_name(int descriptor, double timeout_s) {
+  pollfd readable{descriptor, POLLIN, 0};
+  static_cast<void>(::poll(&readable, 1, static_cast<int>(std::ceil(timeout_s * 1e3))));
+  return true;
+}
+
+}  // namespace
+
 HttpServer::HttpServer(const HttpServerOptions& options)
     : options_(options),
       gate_(options_, &tally_),
@@ -32,8 +46,10 @@ bool HttpServer::check_tls(std::string* error) const {
   return false;
 }
 
-bool HttpServer::start(std::string* error) {
-  if (!listener_->open(&address_, error)) return false;
+bool HttpServer::start(std::string* error) { return start(&wait_for_name, error); }
+
+bool HttpServer::start(const HttpStartWait& wait, std::string* error) {
+  if (!listener_->open(wait, &address_, error)) return false;
   bool started = threads_.start([this] { listener_->serve_network(); });
   for (int i = 0; i < HttpHandlers::kThreads; ++i)
     started = started && threads_.start([this] { listener_->serve_handlers(); });

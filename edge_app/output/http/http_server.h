@@ -35,7 +35,10 @@ class HttpServer {
   // Call before start(). True if certificate and key can be used, or none are configured. False
   // with one line in *error.
   [[nodiscard]] bool check_tls(std::string* error) const;
-  // Binds and listens; call once. False with one line in *error.
+  // Binds and listens; call once. False with one line in *error, or with none if `wait` gave up.
+  // A host that is an address is not waited for.
+  [[nodiscard]] bool start(const HttpStartWait& wait, std::string* error);
+  // The same with a wait that never gives up.
   [[nodiscard]] bool start(std::string* error);
   // After start(): "127.0.0.1:8080", with the actual port.
   [[nodiscard]] const std::string& address() const { return address_; }

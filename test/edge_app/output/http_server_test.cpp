@@ -651,6 +651,21 @@ TEST_F(HttpServerTest, SaysThatTheAddressIsNotOfThisMachine) {
   EXPECT_THAT(error, StartsWith("HTTP: cannot listen on 192.0.2.1:0: "));
 }
 
+TEST_F(HttpServerTest, SaysThatTheHostIsNotFound) {
+  options_.host = "no name";
+  HttpServer server(options_);
+  std::string error;
+  EXPECT_FALSE(server.start(&error));
+  EXPECT_THAT(error, AllOf(StartsWith("HTTP: cannot listen on no name:0: the host is not found: "),
+                           EndsWith("; give an address of this machine")));
+}
+
+TEST_F(HttpServerTest, DoesNotWaitForAnAddress) {
+  HttpServer server(options_);
+  std::string error;
+  EXPECT_TRUE(server.start([](int, double) { return false; }, &error)) << error;
+}
+
 TEST(HttpError, IsOneLineOfJsonWhateverTheTextHolds) {
   const ServerResponse response = http_error(400, "a \"quote\"\nand \xff");
   EXPECT_EQ(response.status, 400);
