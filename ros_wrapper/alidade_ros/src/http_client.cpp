@@ -85,6 +85,10 @@ class HttpClient::Transfer {
         multi_(curl_multi_init()) {
     curl_easy_setopt(easy_.get(), CURLOPT_URL, url_.c_str());
     curl_easy_setopt(easy_.get(), CURLOPT_NOSIGNAL, 1L);
+#if LIBCURL_VERSION_NUM >= 0x075700  // Noetic's is older
+    // A node that ends need not wait for a name look-up.
+    curl_easy_setopt(easy_.get(), CURLOPT_QUICK_EXIT, 1L);
+#endif
     curl_easy_setopt(easy_.get(), CURLOPT_CONNECTTIMEOUT_MS,
                      std::lround(client.address_.connect_timeout_s * 1000));
     curl_easy_setopt(easy_.get(), CURLOPT_ERRORBUFFER, error_text_);
