@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "core/mapping/lens_curve.h"
-#include "core/mapping/map_projection.h"
+#include "core/mapping/picture_motion.h"
 
 namespace alidade {
 

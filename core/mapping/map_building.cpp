@@ -7,6 +7,7 @@
 
 #include "core/mapping/feature_tracks.h"
 #include "core/mapping/map_making.h"
+#include "core/mapping/map_projection.h"
 #include "core/mapping/match_graph.h"
 #include "core/mapping/place_noise.h"
 

@@ -12,7 +12,7 @@
 #include "core/mapping/feature_matching.h"
 #include "core/mapping/features.h"
 #include "core/mapping/lens_curve.h"
-#include "core/mapping/map_projection.h"
+#include "core/mapping/picture_motion.h"
 #include "core/mapping/picture_pose.h"
 
 namespace alidade {

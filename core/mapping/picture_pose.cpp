@@ -8,6 +8,7 @@
 #include <limits>
 #include <random>
 
+#include "core/mapping/map_projection.h"
 #include "core/mapping/pose_adjustment.h"
 #include "core/mapping/two_point_pose.h"
 #include "core/model/nearest_angles.h"

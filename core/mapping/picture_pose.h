@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "core/mapping/lens_curve.h"
-#include "core/mapping/map_projection.h"
+#include "core/mapping/picture_motion.h"
 #include "core/model/angle.h"
 #include "core/model/mechanics.h"
 
