@@ -76,7 +76,8 @@ class Adjustment {
   std::array<bool, kGlobalCount> fixed_;
   Eigen::Index largest_direct_;
   int steps_taken_ = 0;
-  // The last damping that worked is kept: a few steps at a time then get as far as many at once.
+  // The last damping that worked is kept, so several calls of a few steps get as far as one call of
+  // many.
   double damping_ = 1e-8;
 
   Eigen::MatrixXd reduced_;

@@ -3,10 +3,10 @@
 // pixel is compared with the same direction in up to three earlier pictures (earlier_frames.h,
 // frame_warp.h), after a common small shift and the light are estimated (frame_match.h):
 //   z(u) = (now - light then(warp(u) + shift) - offset) / sigma          sigma: DifferenceModel
-// The smallest z of at least two counts, and 0 if they differ in sign. 5x5 pixels together decide
-// (change_regions.h). Method, reasons and limits: docs/motion_detection.md, docs/derivations.md.
-// The constructor takes all memory, some 12 bytes a pixel; find() allocates nothing. Equal calls
-// give equal results. For one thread.
+// Of at least two such z the smallest counts, or 0 if they differ in sign. 5x5 pixels together
+// decide (change_regions.h). Method, reasons and limits: docs/motion_detection.md,
+// docs/derivations.md. The constructor takes all memory, some 12 bytes a pixel; find() allocates
+// nothing. Equal calls give equal results. For one thread.
 
 #include <array>
 #include <vector>
@@ -22,12 +22,12 @@ namespace alidade {
 struct MotionOptions {
   int width = 1280;        // px, of all pictures
   int height = 720;        // px
-  double spacing_s = 0.3;  // between the older of the earlier pictures, of which there are five
-  // Error that remains of orientation, lens and air, one sigma.
+  double spacing_s = 0.3;  // between the five older ones of the earlier pictures
+  // Remaining error of orientation, lens and air, one sigma.
   double sigma_alignment_px = 0.1;
-  // Error by different blur, one sigma: half of the difference of its variances.
+  // Error due to different blur, one sigma: half of the difference of the blurs' variances.
   double sigma_blur_px2 = 0.03;
-  double exposure_s = 0.005;   // the longest exposure, about
+  double exposure_s = 0.005;   // about the longest exposure
   double most_blur_px = 8;     // by the camera's motion during the exposure
   double most_zoom = 0.1;      // |log| of the ratio of focal lengths of pictures that are compared
   double most_shift_px = 3;    // largest error of orientations
@@ -41,8 +41,8 @@ struct MotionOptions {
 
 enum class MotionStatus {
   kOk,
-  kWrongImage,     // none, or not of the size of options and calibration
-  kNoOrientation,  // mode none, or numbers that are not finite or of no camera
+  kWrongImage,     // no picture, or its size is not that of options and calibration
+  kNoOrientation,  // mode none, or its numbers are not finite or describe no camera
   kNotNewer,       // not later than the picture before
   kBlurred,        // the camera turns too fast for the exposure
   // Too little of the picture was seen before: the first ones, after a jump or a change of zoom.
@@ -66,10 +66,11 @@ class MotionDetector {
   // options must be valid.
   explicit MotionDetector(const MotionOptions& options);
 
-  // Pictures refused with kWrongImage, kNoOrientation, kNotNewer or kBlurred are not compared with
-  // later.
+  // A picture refused with kWrongImage, kNoOrientation, kNotNewer or kBlurred is not kept for later
+  // comparisons.
   [[nodiscard]] MotionAnswer find(const ImageView& image, const FrameOrientation& orientation);
-  // Of the latest picture, surest first; none unless its status was kOk. Score: sigmas.
+  // The boxes of the latest picture, the surest first; empty unless its status was kOk. Score:
+  // sigmas.
   [[nodiscard]] const std::vector<DetectionBox>& boxes() const { return boxes_; }
   // Forgets all earlier pictures.
   void forget();

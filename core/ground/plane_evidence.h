@@ -21,7 +21,7 @@ struct PlaneSight {
 
 // kHeight, kPlace, kLevel, kHeading: of the camera or its base.
 // kPoint: direction to something with a known place in w, on the plane or above it.
-// kHorizon: direction of no elevation: of the horizon, or the vanishing point of a line on the
+// kHorizon: a direction with elevation 0: of the horizon, or the vanishing point of a line on the
 // plane.
 // kBearing: such a direction with known heading, as of a street in a map.
 // kVertical: vanishing point of upright edges: straight up or straight down.

@@ -6,8 +6,8 @@
 // with tracks.csv instead of pictures, and any recording if decode is false, gives frames without
 // luma. Pictures that cannot be decoded are skipped and counted. If video.mkv has B-frames, picture
 // k is the k-th in order of capture; rows whose sender_time_s contradict that order are refused. If
-// video.mkv ends before frames.csv, as after a kill of the recorder, the recording ends there;
-// missing_frames() is the number of rows left.
+// video.mkv ends before frames.csv, for example after a kill of the recorder, the recording ends
+// there; missing_frames() is the number of rows left.
 
 #include <cstdint>
 #include <memory>

@@ -1,7 +1,7 @@
 #pragma once
 // ReadingJudge: whether a zoom reading is believed. Decided here only, from the lens that landmarks
 // showed; all others ask. There are two judges: ReadLens's judges the reading, LensFollower's the
-// lens that OE mode was told.
+// lens that OE mode was given.
 // Fixed memory; no allocation. One thread.
 
 #include <algorithm>
@@ -53,7 +53,7 @@ class ReadingJudge {
   [[nodiscard]] ReadingBelief belief(double age_s) const {
     return excluded_ && remembers(age_s) ? ReadingBelief::kExcluded : ReadingBelief::kBelieved;
   }
-  // The same where also the reading's change of log f since then is known, with its sigma.
+  // The same if the reading's change of log f since then is known too, with its sigma.
   [[nodiscard]] ReadingBelief belief(double age_s, double change, double sigma) const {
     if (!remembers(age_s)) return ReadingBelief::kBelieved;
     if (excluded_) return ReadingBelief::kExcluded;

@@ -2,7 +2,7 @@
 // LensScale: phi, the difference of log f from the map's calibration, as a lens does not return
 // exactly to its zoom curve (zoom_curve.h). Learnt with the map's offset g, as telemetry ties the
 // two.
-//   the camera at phi: zoomed by phi (zoom_law.h); a distortion that is exact stays
+//   the camera at phi: zoomed by phi (zoom_law.h); an exact distortion stays the same
 //   d / d phi = S a of all that has a Sensitivity S;  a: by_zoom() of the camera, 0 where exact
 // The calibration's error is a phi + e. g and phi are known up to a noise of their own plus their
 // sensitivity times e; e, of covariance `others`, is independent of that noise and of the noise of
