@@ -40,7 +40,7 @@ enum class PlaneFitStatus {
 [[nodiscard]] const char* to_string(PlaneFitStatus status);
 
 struct DatumFit {
-  std::optional<double> misfit;  // 1 is expected; nothing: no other data check it
+  std::optional<double> misfit;  // 1 is expected; empty: no other data check it
   double checked = 0;            // 0 to 1; how far the other data determine it, too
 };
 

@@ -41,7 +41,7 @@ using PlaneUnknowns = Eigen::Matrix<double, kPlaneParameterCount, Eigen::Dynamic
                                     kPlaneParameterCount, kPlaneParameterCount>;
 [[nodiscard]] PlaneUnknowns plane_unknowns(PlaneFrame frame, const WorldPlane& plane);
 
-// The plane in the camera's frame, if w is that; otherwise unchanged.
+// The plane in the camera's frame, if w is the camera's; otherwise unchanged.
 [[nodiscard]] WorldPlane in_frame(PlaneFrame frame, const WorldPlane& plane);
 
 struct PlaneSolution {

@@ -26,7 +26,7 @@ struct MapMaterial {
   std::vector<const LinkedPicture*> pictures;
 };
 
-// Norm of each observation's residual, px; nothing if it was left out.
+// Norm of each observation's residual, px; empty if it was left out.
 [[nodiscard]] std::vector<std::optional<double>> errors_px(const MapEvidence& evidence,
                                                            const MapAdjustment& found);
 

@@ -33,7 +33,7 @@ class OneSidedClock {
     envelope_.start(prior);
   }
 
-  // Forgets the steps. The line answers no more until start().
+  // Forgets the steps. The line does not answer again until start().
   void restart() {
     shift_s_ = shift_variance_ = 0;
     locked_ = false;

@@ -73,7 +73,7 @@ class UtcLine {
 
  private:
   static constexpr double kSteady_s = 5e-3;
-  // A rate that is off by more than 5e-4 does not hold for so long.
+  // A rate that is off by more than 5e-4 does not hold for this long.
   static constexpr double kProven_s = 10;
   static constexpr double kSharp_s = 5e-3;
 

@@ -18,7 +18,7 @@ enum class ReadingBelief {
 struct ReadingBeliefOptions {
   // Standard deviations of reading and landmarks together, > 0; beyond it the reading is wrong.
   double excluded_sigmas = 5;
-  double longest_s = 0.5;  // s, > 0; for so long the lens that landmarks showed counts
+  double longest_s = 0.5;  // s, > 0; how long the lens that landmarks showed counts
   double fastest = 3;      // 1/s, > 0, of log f: 20 times in a second; no lens is faster
   // Of log f, > 0. For kJumped a reading's sigma counts as at most this, as it grows without bound
   // between readings far apart.
