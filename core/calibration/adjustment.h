@@ -66,7 +66,7 @@ class Adjustment {
   [[nodiscard]] bool covariance_iteratively(const Linearisation& linearisation,
                                             GlobalMatrix* covariance, double* telemetry_unknowns);
   [[nodiscard]] bool reduce(const Linearisation& linearisation, double damping);
-  // Frees megabytes, which what follows a minimisation or the covariance needs itself.
+  // Frees megabytes, which the steps after a minimisation or the covariance need.
   void forget_reduced() { reduced_.resize(0, 0); }
   // minimise() without freeing memory.
   [[nodiscard]] bool descend(const LossScales& loss, int max_steps, double tolerance,

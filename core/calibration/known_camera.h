@@ -17,7 +17,7 @@ namespace alidade {
 
 struct KnownValue {
   CalibrationPrior prior;
-  bool wanted = false;  // false: not known, or stated otherwise
+  bool wanted = false;  // false: not known, or given elsewhere
 };
 
 // For images of the recording's size. Units as in CalibrationOptions.
@@ -40,7 +40,7 @@ struct KnownCameraCalibration {
   std::vector<std::string> remarks;  // what was not used, and why
 };
 
-// options: priors stated otherwise. Known values that are accepted replace them.
+// options: priors given elsewhere. Known values that are accepted replace them.
 [[nodiscard]] KnownCameraCalibration calibrate_knowing(const CalibrationInput& input,
                                                        const CalibrationOptions& options,
                                                        const KnownCamera& known);

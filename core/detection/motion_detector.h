@@ -31,7 +31,7 @@ struct MotionOptions {
   double most_blur_px = 8;     // by the camera's motion during the exposure
   double most_zoom = 0.1;      // |log| of the ratio of focal lengths of pictures that are compared
   double most_shift_px = 3;    // largest error of orientations
-  double most_spread = 4;      // of all differences, over what is expected
+  double most_spread = 4;      // spread of all differences over the expected one
   double least_covered = 0.3;  // of the picture, seen before
   double most_changed = 0.1;   // of the picture
   ChangeOptions change;
@@ -43,7 +43,7 @@ enum class MotionStatus {
   kOk,
   kWrongImage,     // no picture, or its size is not that of options and calibration
   kNoOrientation,  // mode none, or its numbers are not finite or describe no camera
-  kNotNewer,       // not later than the picture before
+  kNotNewer,       // not newer than the picture before
   kBlurred,        // the camera turns too fast for the exposure
   // Too little of the picture was seen before: the first ones, after a jump or a change of zoom.
   kTooLittleOverlap,
@@ -57,7 +57,7 @@ struct MotionAnswer {
   MotionStatus status = MotionStatus::kOk;
   double covered = 0;   // share of the picture in which motion can be found
   double shift_px = 0;  // largest error of the compared pictures' orientations
-  double spread = 0;    // of differences over what was expected, the largest; 1: as expected
+  double spread = 0;    // largest spread of differences over the expected one; 1: as expected
   double changed = 0;   // share of the picture
 };
 

@@ -23,7 +23,7 @@ struct NetworkOptions {
   double threshold = 0.25;          // of the score
   double most_overlap = 0.45;       // of two boxes that both stay
   int most_boxes = 64;              // the surest
-  std::vector<std::string> labels;  // of classes 0, 1, ...; none: numbers
+  std::vector<std::string> labels;  // of classes 0, 1, ...; empty: numbers are used
 
   [[nodiscard]] bool validate(const char** error = nullptr) const;
 };

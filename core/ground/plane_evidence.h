@@ -58,7 +58,7 @@ struct PlaneEvidence {
   std::vector<PlaneDatum> data;
   // Covariance of each look's turn about the base's axes, rad^2.
   std::vector<Matrix3<double>> looks;
-  bool y_is_north = false;  // places are on Earth: a heading must come from the data
+  bool y_is_north = false;  // places are on Earth, so a heading must come from the data
 };
 
 [[nodiscard]] inline PlaneDatum camera_height(double height_m, double sigma_m) {

@@ -22,8 +22,8 @@ using SymmetricEigen = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>;
 enum class PlaneFrame {
   kCamera,   // origin below the camera, Y below the base's forward direction
   kHeading,  // origin below the camera, headings as the data count them
-  kPlace,    // origin as the data's one place has it, Y below the base's forward direction
-  kUser      // as the data's places have it
+  kPlace,    // origin by the data's one place, Y below the base's forward direction
+  kUser      // by the data's places
 };
 
 struct PlaneProblem {

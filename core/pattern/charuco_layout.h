@@ -51,7 +51,7 @@ class CharucoLayout {
   [[nodiscard]] int agreement(const Marker& a, const Marker& b, std::size_t layout) const;
 
   KnownPattern pattern_;
-  std::array<std::vector<cv::Point2d>, 2> middles_;  // as of OpenCV 4.6, and before
+  std::array<std::vector<cv::Point2d>, 2> middles_;  // from OpenCV 4.6 on, and before
   std::array<int, 2> votes_ = {};
   std::size_t chosen_ = 0;
   int images_with_markers_ = 0;

@@ -30,7 +30,7 @@ namespace alidade {
 struct FrameTime {
   ClockEstimate clock;
   bool known = true;   // false: clock.time_s may be late by any amount
-  bool of_use = true;  // false: it will not be known later either, when the pace or the line is
+  bool of_use = true;  // false: it stays unknown even when the pace or the line is known
   // Sum of the steps of the least delay. The receive time contains it, the line does not.
   double delay_shift_s = 0;
   // By how much frames leave the line. Included in clock.sigma_s; common to neighbouring frames.
