@@ -62,8 +62,7 @@ LandmarkUpdate update_landmark(const LandmarkSight& sight, const Matrix2<double>
       is_known_better ? root : Matrix2<double>(rest * root + K * root_of(common));
   const Matrix2<double> shared =
       M * M.transpose() + K.trace() / 2 * share_of_landmarks * sight.cov_of_pose;
-  // A step is far smaller than the basis turns by, except where the basis jumps: the covariances
-  // are turned into the new basis.
+  // The covariances are turned into the new basis, which may have jumped.
   const Matrix<double, 3, 2> before = tangent_basis(state->d_b);
   state->d_b = direction_plus<double>(state->d_b, K * sight.y).normalized();
   const Matrix2<double> turn = tangent_basis(state->d_b).transpose() * before;

@@ -2,7 +2,7 @@
 // Where one picture sees a direction of the map, for localization and adjustment. No allocation.
 //   u = project(camera at row v, M(v)^T R^T d),   R = R_base_from_camera at the reference row
 //   M(v) = Exp(w t), t = (v - reference row) * line delay;   log f at row v grows by zoom_rate t
-// f changes as zoom_law.h has it. w is the camera's turn rate in its own frame, constant over a
+// f changes by zoom_law.h. w is the camera's turn rate in its own frame, constant over a
 // picture (constant rates of the angles, as in rolling_shutter.h, differ in second order). v is the
 // measured row; its error moves t: see reprojection_error_covariance() there.
 
