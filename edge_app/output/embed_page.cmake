@@ -50,13 +50,31 @@ policy_hash("${style}" style_hash)
 policy_hash("${script}" script_hash)
 set(policy "default-src 'none'; style-src ${style_hash}; script-src ${script_hash}; connect-src 'self'; img-src data:; ")
 string(APPEND policy "base-uri 'none'; form-action 'none'; frame-ancestors 'none'")
+
+# In pieces that end with a line: a compiler need not take a literal above 65536 bytes.
+set(pieces "")
+while(NOT page STREQUAL "")
+  string(SUBSTRING "${page}" 0 60000 piece)
+  string(FIND "${piece}" "\n" end REVERSE)
+  if(end EQUAL -1)
+    message(FATAL_ERROR "${PAGE}: a line is too long, or the last one has no end")
+  endif()
+  math(EXPR end "${end} + 1")
+  string(SUBSTRING "${page}" 0 ${end} piece)
+  string(SUBSTRING "${page}" ${end} -1 page)
+  string(APPEND pieces "  text += R\"page(${piece})page\";\n")
+endwhile()
+
 file(WRITE "${SOURCE}" "#include \"edge_app/output/status_page.h\"
 
 namespace alidade {
 
 const char* const kStatusPagePolicy = R\"page(${policy})page\";
 
-const char* const kStatusPage = R\"page(${page})page\";
+std::string status_page_text() {
+  std::string text;
+${pieces}  return text;
+}
 
 }  // namespace alidade
 ")

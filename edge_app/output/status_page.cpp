@@ -25,7 +25,7 @@ ServerResponse no_image() {
 ServerResponse page() {
   ServerResponse response;
   response.type = "text/html; charset=utf-8";
-  response.body = kStatusPage;
+  response.body = status_page_text();
   response.headers = {{"Content-Security-Policy", kStatusPagePolicy},
                       {"Cache-Control", "no-cache"},
                       {"Referrer-Policy", "no-referrer"}};

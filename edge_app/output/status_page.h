@@ -18,7 +18,7 @@
 namespace alidade {
 
 // The build makes these from page/.
-extern const char* const kStatusPage;
+[[nodiscard]] std::string status_page_text();
 extern const char* const kStatusPagePolicy;
 
 // *tap is used until the server has stopped.

@@ -67,7 +67,7 @@ TEST_F(StatusPageTest, ThePageIsOpenAndMayLoadNothingFromElsewhere) {
   const auto answer = anybody.Get("/");
   ASSERT_TRUE(answer);
   EXPECT_EQ(answer->status, 200);
-  EXPECT_EQ(answer->body, kStatusPage);
+  EXPECT_EQ(answer->body, status_page_text());
   EXPECT_EQ(answer->get_header_value("Content-Type"), "text/html; charset=utf-8");
   const std::string policy = answer->get_header_value("Content-Security-Policy");
   EXPECT_EQ(policy.find("default-src 'none'; "), 0U);
@@ -75,10 +75,10 @@ TEST_F(StatusPageTest, ThePageIsOpenAndMayLoadNothingFromElsewhere) {
   EXPECT_EQ(policy.find("unsafe"), std::string::npos);
   for (const char* unsafe :
        {"innerHTML", "outerHTML", "insertAdjacent", "document.write", "eval("}) {
-    EXPECT_EQ(std::string(kStatusPage).find(unsafe), std::string::npos) << unsafe;
+    EXPECT_EQ(status_page_text().find(unsafe), std::string::npos) << unsafe;
   }
   // The name of SVG's namespace in the icon is the only one.
-  std::string page = kStatusPage;
+  std::string page = status_page_text();
   const std::string space = "http://www.w3.org/2000/svg";
   ASSERT_NE(page.find(space), std::string::npos);
   page.erase(page.find(space), space.size());
@@ -94,7 +94,7 @@ int count_of(const std::string& text, const std::string& page) {
 }
 
 TEST(StatusPage, IsOneStyleAndOneScript) {
-  const std::string page = kStatusPage;
+  const std::string page = status_page_text();
   for (const char* element : {"<style", "<script"})
     EXPECT_EQ(count_of(element, page), 1) << element;
   for (const char* left : {"\nimport ", "\nexport ", "style.css\"", "main.js\""})
@@ -102,7 +102,7 @@ TEST(StatusPage, IsOneStyleAndOneScript) {
 }
 
 TEST(StatusPage, SaysInWordsWhatEachStatusMeans) {
-  const std::string page = kStatusPage;
+  const std::string page = status_page_text();
   for (const RecordStatus status : kRecordStatuses)
     EXPECT_NE(page.find(std::string("\n  '") + to_string(status) + "': '"), std::string::npos)
         << to_string(status);
