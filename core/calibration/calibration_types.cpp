@@ -15,6 +15,7 @@ bool CalibrationOptions::validate(std::string* error) const {
   if (focal_length)
     check(*focal_length, true, "the prior of the focal length needs a value > 0, sigma >= 0");
   if (aspect) check(*aspect, true, "the prior of the aspect needs a value > 0, sigma >= 0");
+  static_assert(kDistortionCount == 1, "the prior of each term");
   if (radial_distortion)
     check(*radial_distortion, false, "the prior of the distortion needs sigma >= 0");
   if (line_delay) check(*line_delay, false, "the prior of the line delay needs sigma >= 0");

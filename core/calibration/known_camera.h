@@ -29,6 +29,7 @@ struct KnownCamera {
   KnownValue line_delay;
 
   [[nodiscard]] bool empty() const {
+    static_assert(kDistortionCount == 1, "what is known of each term");
     return !focal_length.wanted && !aspect.wanted && !radial_distortion.wanted &&
            !line_delay.wanted;
   }

@@ -60,6 +60,7 @@ void set_prior(const char* option, const std::string& text, const char* unit,
 void set_priors(const CalibrateOptions& options, CalibrationOptions* calibration) {
   set_prior("--focal-length", options.focal_length, "px", &calibration->focal_length);
   set_prior("--aspect", options.aspect, "f_v / f_u", &calibration->aspect);
+  static_assert(kDistortionCount == 1, "an option for each term");
   set_prior("--radial-distortion", options.radial_distortion, "1", &calibration->radial_distortion);
   set_prior("--line-delay", options.line_delay, "s/row", &calibration->line_delay);
   set_prior("--clock-offset", options.clock_offset, "s", &calibration->clock_offset);

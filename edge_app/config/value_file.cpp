@@ -3,6 +3,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "core/model/lens/distortion.h"
 #include "edge_app/config/yaml_section.h"
 
 namespace alidade {
@@ -41,6 +42,7 @@ void read_values(YamlSection& top, CalibrationValues* values) {
   }
   values->focal_length = stated_value(top, "focal_length", {1, 1e7, "px"});
   values->aspect = stated_value(top, "aspect", {0.5, 2, "1"});
+  static_assert(kDistortionCount == 1, "a key for each term");
   values->radial_distortion = stated_value(top, "radial_distortion", {-1e12, 1e12, "1"});
   values->line_delay = stated_value(top, "line_delay", {-1e-3, 1e-3, "s/row"});
   values->clock_offset = stated_value(top, "clock_offset", {-10, 10, "s"});

@@ -152,6 +152,7 @@ std::vector<std::pair<std::string, CalibrationPrior>> stated_priors(
   };
   add(Parameter::kFocalLength, options.focal_length);
   add(Parameter::kAspect, options.aspect);
+  static_assert(kDistortionCount == 1, "the prior of each term");
   add(Parameter::kRadialDistortion, options.radial_distortion);
   add(Parameter::kLineDelay, options.line_delay);
   for (const Parameter axis :

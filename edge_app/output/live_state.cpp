@@ -19,6 +19,7 @@ std::string make_start_id() {
 }
 
 bool same(const PlainCalibration& a, const PlainCalibration& b) {
+  static_assert(kDistortionCount == 1, "each term is compared");
   return a.focal_length == b.focal_length && a.aspect == b.aspect &&
          a.radial_distortion == b.radial_distortion && a.centre_u == b.centre_u &&
          a.centre_v == b.centre_v && a.line_delay == b.line_delay && a.pan_axis == b.pan_axis &&

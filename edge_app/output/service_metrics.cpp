@@ -44,6 +44,7 @@ void add_calibration_metrics(const OrientationRecord& newest, double age_s, Metr
   out->add(sigma(Parameter::kFocalLength));
   out->gauge("alidade_calibration_aspect_sigma_ratio", "Standard deviation of the aspect");
   out->add(sigma(Parameter::kAspect));
+  static_assert(kDistortionCount == 1, "a gauge for each term");
   out->gauge("alidade_calibration_radial_distortion_sigma_ratio",
              "Standard deviation of the radial distortion");
   out->add(sigma(Parameter::kRadialDistortion));

@@ -132,7 +132,8 @@ bool SceneMapFile::check_kind(std::string* error) {
                   error);
   }
   std::vector<std::string> expected(kSceneMapTables.begin(), kSceneMapTables.end());
-  if (without_rest) expected.erase(expected.begin() + kLensRestTable);
+  if (without_rest)
+    expected.assign(kSceneMapTablesWithoutRest.begin(), kSceneMapTablesWithoutRest.end());
   SqliteStatement schema(&database_,
                          "SELECT sql FROM sqlite_schema WHERE sql IS NOT NULL ORDER BY name");
   std::size_t tables = 0;
@@ -164,14 +165,12 @@ bool SceneMapFile::is_of(int width, int height, std::string* error) const {
 bool SceneMapFile::replace(const SceneMap& map, std::string* error) {
   set_up_log(&database_);
   SqliteTransaction transaction(&database_, true);
-  if (database_.number_of("PRAGMA user_version") == kSceneMapFormatWithoutRest) {
-    database_.execute(kSceneMapTables[kLensRestTable]);
-    database_.execute("PRAGMA user_version = " + std::to_string(kSceneMapFormat));
-  }
+  const bool other_tables = database_.number_of("PRAGMA user_version") != kSceneMapFormat;
   for (const char* table : {"sighting", "picture", "landmark", "keyframe", "lens_rest",
                             "lens_point", "lens_knot", "scene"}) {
-    database_.execute(std::string("DELETE FROM ") + table);
+    database_.execute(std::string(other_tables ? "DROP TABLE IF EXISTS " : "DELETE FROM ") + table);
   }
+  if (other_tables) make_tables(&database_);
   write_scene_map(map, scene_.revision + 1, &database_);
   if (!transaction.commit()) return refuse_failure(error);
   return read_scene(&scene_, error);

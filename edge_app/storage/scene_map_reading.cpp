@@ -64,6 +64,7 @@ bool SceneMapFile::read_lens(const SceneRow& scene, LensCurve* lens, std::string
   if (fits && !database_.failed()) {
     LensCurve found(static_cast<int>(scene.width), static_cast<int>(scene.height), scene.aspect,
                     knots);
+    static_assert(kDistortionCount == 1, "a column for each quantity");
     SqliteStatement select(
         &database_, "SELECT delta, kappa, centre_u, centre_v FROM lens_point ORDER BY number");
     int i = 0;

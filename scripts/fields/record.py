@@ -8,12 +8,14 @@ LIST = "edge_app/record/record_fields.yaml"
 BY = by(LIST)
 KEYS = {"name", "type", "unit", "null_if", "says", "more", "value", "of", "enum", "minimum", "absent", "start", "ros", "columns", "members"}
 TYPES = {"number", "integer", "boolean", "word", "array", "object"}
+# Those of CONVENTIONS.md: a time in ms or an angle in degrees would be the only one of a record.
+UNITS = ("s", "s/row", "1/s", "px", "rad", "rad^2", "rad/s", "rad/s^2")
 CPP = {"number": "double", "integer": "std::int64_t", "boolean": "bool", "word": "std::string"}
 
 
 def fields_of_list():
     fields = []
-    for field, where in entries(LIST, KEYS, ("name", "type", "says", "value", "ros"), TYPES):
+    for field, where in entries(LIST, KEYS, ("name", "type", "says", "value", "ros"), TYPES, UNITS):
         if field["type"] == "array" and not field.get("columns"):
             raise ListError(f"{where}: an array has columns")
         # In a ROS message only a float64 and a string can say that there is no value.

@@ -7,13 +7,14 @@ LIST = "edge_app/tracking/target_fields.yaml"
 BY = by(LIST)
 KEYS = {"name", "type", "unit", "space", "null_if", "left_out_if", "says", "more", "value", "minimum", "maximum", "size", "members", "ros"}
 TYPES = {"number", "integer", "word", "vector", "matrix", "object"}
+UNITS = ("s", "m", "m/s", "px", "px^2", "rad", "rad/s", "deg")  # degrees: latitude and longitude
 SPACES = ("plane", "sphere")
 READ = {"number": "number", "integer": "integer", "word": "word"}
 
 
 def fields_of_list():
     fields = []
-    for field, where in entries(LIST, KEYS, ("name", "type", "says", "value", "ros"), TYPES):
+    for field, where in entries(LIST, KEYS, ("name", "type", "says", "value", "ros"), TYPES, UNITS):
         if field["type"] in ("vector", "matrix") and "size" not in field:
             raise ListError(f"{where}: a {field['type']} has a size")
         if field.get("space", "plane") not in SPACES:

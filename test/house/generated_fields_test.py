@@ -1,17 +1,23 @@
 #!/usr/bin/env python3
 """Do all interfaces have the fields of records and targets as their lists have them? And are slips in a list named?"""
 import pathlib
+import re
 import shutil
 import subprocess
 import sys
 import tempfile
 import unittest
 
+import yaml
+
 TOP = pathlib.Path(__file__).resolve().parents[2]
 RECORD_LIST = "edge_app/record/record_fields.yaml"
 TARGET_LIST = "edge_app/tracking/target_fields.yaml"
 AROUND_TARGETS_LIST = "edge_app/tracking/target_list_fields.yaml"
 OPENAPI = "edge_app/output/openapi.yaml"
+RECORD = "edge_app/record/orientation_record.h"
+# Members that no field shows: metrics and status have the first, scene map upkeep uses the second.
+NOT_SHOWN = {"clock_locked", "telemetry_zero"}
 # What is generated, and what a new field brings there.
 OF_RECORDS = {
     "edge_app/record/record_fields.h": 'line->add("sun_rad", record.sun_rad);',
@@ -109,18 +115,32 @@ class GeneratedFields(unittest.TestCase):
         for file in (*OF_RECORDS, *OF_TARGETS, *AROUND_TARGETS):
             self.assertIn(f"{file}: not as ", output)
 
+    def test_every_member_of_a_record_is_in_its_list(self):
+        struct = (TOP / RECORD).read_text(encoding="utf-8").split("struct OrientationRecord {")[1].split("\n};")[0]
+        struct = re.sub(r"//.*", "", struct)
+        members = re.findall(r"^ +[\w:]+(?:<.*>)? (\w+)(?: = [^;]+|\{[^;]*\})?;", struct, re.MULTILINE)
+        self.assertEqual(len(members), struct.count(";") - len(re.findall(r"\n +\};", struct)), "some member is not understood")
+        values = [one["value"] for field in yaml.safe_load((TOP / RECORD_LIST).read_text(encoding="utf-8"))
+                  for one in (field, *field.get("members", ()))]
+        used = set(re.findall(r"\w+", "\n".join([*values, (TOP / "edge_app/record/record_values.h").read_text(encoding="utf-8")])))
+        missing = [member for member in members if member not in used | NOT_SHOWN]
+        self.assertFalse(missing, f"{RECORD_LIST} has no field for {', '.join(missing)} of {RECORD}")
+
     def test_slips_in_a_list_are_named(self):
         of_records = ((NEW.replace("says:", "sais:"), "sun_rad: sais is unknown"),
                       (NEW.replace("  value: record.sun_rad\n", ""), "sun_rad: value is missing"),
                       (NEW.replace("type: number", "type: angle"), "sun_rad: type is angle; it may be array, "),
                       (NEW.replace("type: number", "type: array"), "sun_rad: an array has columns"),
                       (NEW.replace("type: number", "type: object"), "sun_rad: an object has members"),
+                      (NEW.replace("unit: rad", "unit: ms"), "sun_rad: unit is ms; it may be s, "),
+                      (NEW.replace("type: number", "type: object\n  members: [{name: a, unit: deg}]"), "sun_rad: unit is deg; it may be s, "),
                       (NEW.replace("sun_rad", "zoom"), "zoom stands there twice"),
                       (NEW.replace("type: number", "type: integer"), "sun_rad: an integer that may be null has ros: as: presence"),
                       (NEW.replace("type: number", "type: boolean"), "sun_rad: a field of type boolean cannot be null"),
                       ("- [", "generate-fields: "))
         new = NEW_OF_TARGETS
         of_targets = ((new.replace("says:", "sais:"), "height_m: sais is unknown"),
+                      (new.replace("unit: m", "unit: feet"), "height_m: unit is feet; it may be s, "),
                       (new.replace("height_m", "pixel"), "pixel stands there twice"),
                       (new.replace("type: number", "type: vector"), "height_m: a vector has a size"),
                       (new.replace("type: number", "type: matrix\n  size: 2"), "height_m: ros: as is missing"),

@@ -128,9 +128,14 @@ def events(file):
 
 
 class Http(SystemTest):
-    def start(self, mode="PT", json_output=True, settings=None, **sections):
-        """alidade with the virtual camera, answering."""
+    def start(self, mode="PT", json_output=True, settings=None, calibration=None, **sections):
+        """alidade with the virtual camera, answering. calibration: entries of it that take the place of the truth's."""
         camera = self.camera(settings=settings)
+        if calibration:
+            file = self.folder / "calibration.yaml"
+            truth = yaml.safe_load((camera.truth / "truth.yaml").read_text(encoding="utf-8"))
+            file.write_text(json.dumps({**truth, **calibration}))
+            sections["calibration"] = {"file": str(file), "auto": False}
         targets = {"targets": str(self.folder / "targets.jsonl")} if "tracking" in sections else {}
         config = self.write_config(camera, output={"json": json_output, "http": "127.0.0.1:0", "token_env": "TEST_TOKEN", **targets},
                                    realtime={"mode": mode}, **sections)
@@ -275,6 +280,14 @@ class Http(SystemTest):
         for one in told:
             check(one, {"$ref": "#/components/schemas/Targets"})
         self.assertEqual(told[-1]["targets"][0]["identity"], 1)
+
+    def test_describes_a_calibration_with_an_optical_centre(self):
+        run, api = self.start(calibration={"centre_offset": {"value": [3.5, -2], "sigma": [0.5, 0.25]}})
+        calibration = self.check_answer(api, "/api/v1/calibration")
+        self.assertEqual(calibration["centre_offset"], {"value": [3.5, -2], "sigma": [0.5, 0.25]})
+        names, matrix = (calibration["covariance"][key] for key in ("names", "matrix"))
+        self.assertEqual([len(names), *map(len, matrix)], [13] + 13 * [len(names)])
+        self.end(run)
 
     def test_describes_what_it_refuses(self):
         run, api = self.start(tracking={})

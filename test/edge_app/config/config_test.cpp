@@ -9,7 +9,12 @@
 #include <cstdlib>
 #include <fstream>
 #include <iterator>
+#include <map>
+#include <set>
+#include <sstream>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "edge_app/config/nearest_word.h"
 #include "edge_app/config/noise_file.h"
@@ -677,6 +682,75 @@ TEST_F(ConfigTest, TheExampleIsReadAndShowsTheDefaults) {
   EXPECT_EQ(example.camera.line_delay_s, config_.camera.line_delay_s);
   EXPECT_EQ(example.realtime.priority, config_.realtime.priority);
   EXPECT_EQ(example.realtime.max_extrapolation_s, config_.realtime.max_extrapolation_s);
+}
+
+// "section.key" of each line of an example, commented out or not. Keys of a section within a
+// section count as the outer one's.
+std::set<std::string> keys_of_example(const char* path) {
+  const std::string kOfWords = "abcdefghijklmnopqrstuvwxyz_0123456789";
+  std::set<std::string> keys;
+  std::ifstream file(path);
+  std::string section;
+  for (std::string line; std::getline(file, line);) {
+    if (line.rfind("# ", 0) == 0) line.erase(0, 2);
+    const std::size_t begin = line.find_first_not_of(" #");
+    const std::size_t end = line.find_first_not_of(kOfWords, begin);
+    if (end == std::string::npos || end == begin || line[end] != ':') continue;
+    if (begin == 0) section = line.substr(0, end);
+    keys.insert(section + "." + line.substr(begin, end - begin));
+  }
+  return keys;
+}
+
+TEST_F(ConfigTest, TheExamplesShowEveryKey) {
+  std::set<std::string> shown;
+  for (const char* example : {ALIDADE_EXAMPLE, ALIDADE_HEAD_EXAMPLE, ALIDADE_USB_EXAMPLE})
+    shown.merge(keys_of_example(example));
+  const std::string head = "pan_positive: left, tilt_positive: up";
+  const std::string steps = ", pan_deg_per_step: 1, tilt_deg_per_step: 1, header: true";
+  // Each kind of section with a key that does not exist.
+  const std::vector<std::pair<std::string, std::string>> sections = {
+      {"video", "{type: rtsp, url: 'rtsp://c/s', zzz: 1}"},
+      {"video", "{type: rtp, url: 'rtp://@:5004', zzz: 1}"},
+      {"video", "{type: mjpeg, url: 'http://c', zzz: 1}"},
+      {"video", "{type: recording, directory: film, zzz: 1}"},
+      {"video", "{type: v4l2, device: /dev/video0, zzz: 1}"},
+      {"pan_tilt", "{type: vapix, url: 'http://c', zzz: 1}"},
+      {"pan_tilt", "{type: onvif, url: 'http://c', zzz: 1}"},
+      {"pan_tilt", "{type: recording, directory: film, zzz: 1}"},
+      {"pan_tilt", "{type: none, zzz: 1}"},
+      {"pan_tilt", "{type: pelco_d, device: /dev/ttyS0, zzz: 1}"},
+      {"pan_tilt", "{type: visca, url: 'udp://c:1', " + head + steps + ", zzz: 1}"},
+      {"pan_tilt", "{type: ptu, url: 'tcp://c:1', " + head + ", zzz: 1}"},
+      {"camera", "{zzz: 1}"},
+      {"calibration", "{zzz: 1}"},
+      {"realtime", "{zzz: 1}"},
+      {"scene_map", "{zzz: 1}"},
+      {"tracking", "{zzz: 1}"},
+      {"detectors", "{zzz: 1}"},
+      {"detectors", "{motion: {zzz: 1}}"},
+      {"detectors", "{people: {zzz: 1}}"},
+      {"detectors", "{onnx: {model: m, zzz: 1}}"},
+      {"mqtt", "{url: 'mqtts://b', zzz: 1}"},
+      {"output", "{zzz: 1}"},
+      {"output", "{http: '127.0.0.1:0', tls: {certificate: c, key: k, zzz: 1}}"}};
+  for (const auto& [section, content] : sections) {
+    std::map<std::string, std::string> text = {{"video", "{type: rtsp, url: 'rtsp://c/s'}"},
+                                               {"pan_tilt", "{type: vapix, url: 'http://c'}"}};
+    text[section] = content;
+    std::string whole;
+    for (const auto& [name, value] : text) whole.append(name).append(": ").append(value) += '\n';
+    const std::string error = load(whole);
+    const std::string before = "unknown key; known here: ";
+    const std::size_t at = error.find(before);
+    ASSERT_NE(at, std::string::npos) << section << ": " << error;
+    std::istringstream known(error.substr(at + before.size()));
+    for (std::string key; known >> key;) {
+      if (key.back() == ',') key.pop_back();
+      EXPECT_EQ(shown.count(section + "." + key), 1U)
+          << "no line of an example shows " << section << "." << key;
+    }
+  }
 }
 
 TEST_F(ConfigTest, MissingFileAndDirectoryInItsPlaceAreRefused) {

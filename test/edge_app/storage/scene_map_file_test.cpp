@@ -6,8 +6,10 @@
 #include <signal.h>
 #include <sys/resource.h>
 
+#include <array>
 #include <filesystem>
 #include <limits>
+#include <string>
 
 #include "edge_app/storage/scene_map_writing.h"
 #include "test/edge_app/storage/changing_scene_map.h"
@@ -291,10 +293,55 @@ TEST_F(SceneMapFileTest, RefusesAnotherFormat) {
   expect_refused("of format 3, this program has format 2; build it again");
 }
 
+// The schema of a file of format 1, which is never to be changed.
+constexpr const char* kFormat1 =
+    "PRAGMA application_id = 1095521101; PRAGMA user_version = 1;"
+    "CREATE TABLE keyframe(id INTEGER PRIMARY KEY, recording, frame, time_utc_s, zoom, position, "
+    "telemetry_pan, telemetry_tilt, "
+    "q_x, q_y, q_z, q_w, eps, "
+    "cov_xx, cov_xy, cov_xz, cov_xf, cov_yy, cov_yz, cov_yf, cov_zz, cov_zf, cov_ff, "
+    "w_x, w_y, w_z, zoom_rate, residual_px, crc);"
+    "CREATE TABLE landmark(id INTEGER PRIMARY KEY, d_x, d_y, d_z, cov_xx, cov_xy, cov_yy, "
+    "shared_xx, shared_xy, shared_yy, "
+    "scale_rad, focal_length_px, descriptor, born_utc_s, last_seen_utc_s, looked_for, matched, "
+    "missed, "
+    "sightings, sightings_crc, crc);"
+    "CREATE TABLE lens_knot(number INTEGER PRIMARY KEY, log_f);"
+    "CREATE TABLE lens_point(number INTEGER PRIMARY KEY, delta, kappa, centre_u, centre_v);"
+    "CREATE TABLE picture(keyframe INTEGER PRIMARY KEY REFERENCES keyframe(id), luma, crc);"
+    "CREATE TABLE scene(id INTEGER PRIMARY KEY, revision, width, height, aspect, line_delay_s, "
+    "reference_row_px, "
+    "has_mechanics, pan_axis_x, pan_axis_y, pan_axis_z, tilt_axis_x, tilt_axis_y, tilt_axis_z, "
+    "pan_scale, tilt_scale, "
+    "next_landmark, lens_points, lens_crc, keyframes, landmarks, sightings, row_sum, crc);"
+    "CREATE TABLE sighting(landmark REFERENCES landmark(id), keyframe REFERENCES keyframe(id), "
+    "u_px, v_px, scale_px, "
+    "PRIMARY KEY(landmark, keyframe)) WITHOUT ROWID;";
+
+// The same rows, in tables as the program of that time made them.
+void rewrite_in_format_1(const std::string& path) {
+  SqliteDatabase database;
+  ASSERT_TRUE(database.open(path, false));
+  const std::array<std::string, 7> tables = {"sighting", "picture",    "landmark", "keyframe",
+                                             "scene",    "lens_point", "lens_knot"};
+  for (const std::string& table : tables) {
+    database.execute("CREATE TEMP TABLE rows_of_" + table + " AS SELECT * FROM main." + table);
+    database.execute("DROP TABLE main." + table);
+  }
+  database.execute("DROP TABLE main.lens_rest");
+  database.execute(kFormat1);
+  for (const std::string& table : tables) {
+    const std::string columns =
+        table == "lens_point" ? "number, delta, kappa, centre_u, centre_v" : "*";
+    database.execute("INSERT INTO main." + table + " SELECT " + columns + " FROM rows_of_" + table);
+  }
+  ASSERT_FALSE(database.failed()) << database.failure_text();
+}
+
 // A map that was written before a lens had a hold: as it was then, updated as it is, replaced by one of today.
 TEST_F(SceneMapFileTest, ReadsTheFormatBefore) {
   SceneMap map = save(map_before_changes());
-  execute("DROP TABLE lens_rest; PRAGMA user_version = 1");
+  rewrite_in_format_1(path);
   forge([&](SceneRow* scene) { scene->lens_sum = sum_of(map.lens, false); });
   map.lens.hold() = 1;
   EXPECT_TRUE(loaded_bytes() == bytes_of(map));

@@ -9,6 +9,7 @@
 #include <fstream>
 #include <iterator>
 #include <thread>
+#include <tuple>
 
 #include "platform/storage/recording.h"
 #include "test/support/temporary_directory.h"
@@ -46,6 +47,23 @@ PanTiltSample some_sample(int i) {
   return sample;
 }
 
+// All members, in their order. A new one does not compile here: some_frame() or some_sample() is to
+// give it a value, and a recording to keep it.
+auto members_of(const FrameStamp& stamp) {
+  // stamped_at is not stored: it stays at its default.
+  const auto& [frame, receive_time_s, sender_time_s, sender_utc_s, sequence, restarted,
+               stamped_at] = stamp;
+  return std::tuple(frame, receive_time_s, sender_time_s, sender_utc_s, sequence, restarted,
+                    static_cast<int>(stamped_at));
+}
+
+auto members_of(const PanTiltSample& sample) {
+  const auto& [earliest_time_s, latest_time_s, pan_rad, tilt_rad, zoom, device_time_s, sequence,
+               restarted] = sample;
+  return std::tuple(earliest_time_s, latest_time_s, pan_rad, tilt_rad, zoom, device_time_s,
+                    sequence, restarted);
+}
+
 TEST(RecordingWriter, WritesWhatTheReaderReadsBackToTheLastBit) {
   const TemporaryDirectory directory;
   const std::string path = directory.path() + "/new/recording";
@@ -71,24 +89,8 @@ TEST(RecordingWriter, WritesWhatTheReaderReadsBackToTheLastBit) {
   ASSERT_EQ(frames.size(), 20U);
   ASSERT_EQ(samples.size(), 20U);
   for (int i = 0; i < 20; ++i) {
-    const FrameStamp& frame = frames[static_cast<std::size_t>(i)];
-    const FrameStamp expected = some_frame(i);
-    EXPECT_EQ(frame.frame, expected.frame);
-    EXPECT_EQ(frame.receive_time_s, expected.receive_time_s);
-    EXPECT_EQ(frame.sender_time_s, expected.sender_time_s);
-    EXPECT_EQ(frame.sender_utc_s, expected.sender_utc_s);
-    EXPECT_EQ(frame.sequence, expected.sequence);
-    EXPECT_EQ(frame.restarted, expected.restarted);
-    const PanTiltSample& sample = samples[static_cast<std::size_t>(i)];
-    const PanTiltSample wanted = some_sample(i);
-    EXPECT_EQ(sample.latest_time_s, wanted.latest_time_s);
-    EXPECT_EQ(sample.earliest_time_s, wanted.earliest_time_s);
-    EXPECT_EQ(sample.pan_rad, wanted.pan_rad);
-    EXPECT_EQ(sample.tilt_rad, wanted.tilt_rad);
-    EXPECT_EQ(sample.zoom, wanted.zoom);
-    EXPECT_EQ(sample.device_time_s, wanted.device_time_s);
-    EXPECT_EQ(sample.sequence, wanted.sequence);
-    EXPECT_EQ(sample.restarted, wanted.restarted);
+    EXPECT_EQ(members_of(frames[static_cast<std::size_t>(i)]), members_of(some_frame(i)));
+    EXPECT_EQ(members_of(samples[static_cast<std::size_t>(i)]), members_of(some_sample(i)));
   }
 }
 

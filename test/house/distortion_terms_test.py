@@ -1,0 +1,50 @@
+#!/usr/bin/env python3
+"""Is each term of the camera's distortion where no compiler looks for it? (core/model/lens/README.md)"""
+import pathlib
+import re
+import unittest
+
+TOP = pathlib.Path(__file__).resolve().parents[2]
+KINDS = "core/model/lens/distortion.h"
+# (file, first line, end) of the parts that name every term; None: to the file's beginning or end.
+PARTS = (("edge_app/output/openapi.yaml", "    ZoomCurve:", "    Calibration:"),
+         ("edge_app/output/openapi.yaml", "    Calibration:", "    FrameNumber:"),
+         ("edge_app/output/page/calibration.js", "const kParameters = [", "];"),
+         ("ros_wrapper/alidade_msgs/msg/Calibration.msg", None, None),
+         ("ros_wrapper/alidade_msgs/msg/ZoomNode.msg", None, None),
+         ("ros_wrapper/alidade_ros/include/alidade_ros/record.h", "struct ZoomNodeValues {", "};"),
+         ("ros_wrapper/alidade_ros/include/alidade_ros/record.h", "struct CalibrationValues {", "};"),
+         ("ros_wrapper/alidade_ros/src/record.cpp", "ZoomNodeValues zoom_node(", "}\n"),
+         ("ros_wrapper/alidade_ros/src/record.cpp", "bool parse_calibration(", None),
+         ("ros_wrapper/alidade_ros/src/conversions.cpp", None, None),
+         ("ros_wrapper/alidade_ros/src/edge_bridge.cpp", "bool same_camera(", "}\n"),
+         ("test/simulator/camera_model.cpp", None, None),
+         ("scripts/demo_report.py", None, None))
+
+
+def terms():
+    """The names of the kind that `Distortion` is."""
+    text = (TOP / KINDS).read_text(encoding="utf-8")
+    kind = re.search(r"using Distortion = (\w+)<S>;", text)[1]
+    names = re.search(r"kNames = \{(.*?)\};", text[text.index(f"struct {kind} "):], re.DOTALL)[1]
+    return re.findall(r'"(\w+)"', names)
+
+
+def part(file, begin, end):
+    text = (TOP / file).read_text(encoding="utf-8")
+    if begin:
+        text = text[text.index("\n" + begin) + 1:]
+    return text[:text.index("\n" + end)] if end else text
+
+
+class DistortionTerms(unittest.TestCase):
+    def test_are_in_every_interface(self):
+        names = terms()
+        self.assertTrue(names)
+        missing = [f"{file}{f' ({begin.strip()})' if begin else ''} lacks {name}" for file, begin, end in PARTS for name in names
+                   if not re.search(rf"\b{name}\b", part(file, begin, end))]
+        self.assertFalse(missing, "\n".join(missing))
+
+
+if __name__ == "__main__":
+    unittest.main()
