@@ -193,9 +193,9 @@ class OrientationStep {
   std::unique_ptr<StartUpTracker> start_up_;  // null: nobody needs its points
   ZoomReadings zoom_;
   ReadLens lens_;
-  bool zoom_on_curve_ = false;  // the present zoom lies on the zoom curve
-  bool begins_here_ = false;    // and the curve is sharp enough there for a map to begin
-  double minimum_delay_sigma_s_ = 0;
+  bool zoom_on_curve_ = false;        // the present zoom lies on the zoom curve
+  bool begins_here_ = false;          // and the curve is sharp enough there for a map to begin
+  double minimum_delay_sigma_s_ = 0;  // of the calibration in use, against this connection
   // s: the part of a frame's time error that neighbouring frames share.
   double lasting_sigma_s_ = 0;
   RepeatedImages repeated_images_;

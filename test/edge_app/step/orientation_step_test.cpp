@@ -1170,6 +1170,7 @@ TEST_F(OeStepTest, ANewConnectionsDelayIsLessSureUntilACalibrationOfIt) {
   moving.oe.reset();
   OrientationStep step(moving);
   Sweep sweep;
+  sweep.tilt_rate = 0;
   const auto sigma = [&](int first, bool reconnected) {
     OrientationRecord record;
     for (int i = first; i < first + 100; ++i) {
@@ -1191,8 +1192,23 @@ TEST_F(OeStepTest, ANewConnectionsDelayIsLessSureUntilACalibrationOfIt) {
   PublishedCalibration published;
   published.calibration = moving.calibration;
   published.calibrated = true;
+  // As stored for another zoom: its d is of another connection, too.
+  published.of_this_connection = false;
   step.adopt(published);
-  EXPECT_LT(sigma(200, false), 1.05 * before) << "the clock itself is known better by now";
+  EXPECT_GT(sigma(200, false), 0.95 * after);
+  PublishedCalibration withdrawn = published;
+  withdrawn.calibrated = false;
+  withdrawn.of_this_connection = true;
+  step.adopt(withdrawn);
+  EXPECT_GT(sigma(300, false), 0.95 * after) << "its d stays in use";
+  published.of_this_connection = true;
+  step.adopt(published);
+  EXPECT_LT(sigma(400, false), 1.05 * before) << "the clock itself is known better by now";
+  // Without a reconnection: what is stored was found before.
+  published.of_this_connection = false;
+  step.adopt(published);
+  EXPECT_NEAR(std::sqrt(std::pow(sigma(500, false), 2) - before * before), expected,
+              0.1 * expected);
 }
 
 }  // namespace
