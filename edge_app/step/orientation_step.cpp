@@ -159,6 +159,7 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
   const ClockEstimate& clock = frame_time.clock;
   events->video_clock_restarted = clock.restarted;
   events->video_delay_stepped = clock.delay_stepped;
+  events->video_moved_s = frame_time.moved_s;
   events->video_delay_wander_s = frame_time.wander_s;
   events->stamps_left_out = frame_time.stamp_rate_error;
   events->stamps_count = frame_time.stamps_count;

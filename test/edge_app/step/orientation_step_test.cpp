@@ -1144,6 +1144,30 @@ INSTANTIATE_TEST_SUITE_P(
         FalseStamps{"OnePercentFast", [](int, double t) { return 1.01 * t; }}),
     [](const auto& one) { return one.param.name; });
 
+// d is of the delay before the step, so sigma holds the step until a calibration of the time after it.
+TEST(OrientationStep, TellsAStepOfTheSendersClockWithItsSize) {
+  OrientationStepOptions options = options_without_offsets();
+  options.wait_for_pace = true;
+  OrientationStep step(options);
+  int steps = 0;
+  OrientationRecord record;
+  for (int i = 0; i < 25 * 120; ++i) {
+    const double time_s = 0.04 * i;
+    FrameStamp stamp = stamp_at(time_s, i);
+    stamp.sender_time_s = 5000 + time_s + (time_s > 20 ? 0.04 : 0);
+    stamp.restarted = i == 0;
+    StepEvents events;
+    record = step.add_frame(stamp, ImageView{}, &events);
+    EXPECT_FALSE(events.video_clock_restarted) << time_s;
+    if (!events.video_delay_stepped) continue;
+    ++steps;
+    EXPECT_NEAR(events.video_moved_s, 0.04, 1e-3);
+    EXPECT_LE(time_s, 31);
+  }
+  EXPECT_EQ(steps, 1);
+  EXPECT_GE(record.time_sigma_s, 0.04) << "long after the clock itself is at rest";
+}
+
 // The line's error and that of the least delay below it.
 TEST_F(OeStepTest, TheTimesSigmaIsThatOfTwoIndependentErrors) {
   const auto sigma_after_a_reconnection = [](double minimum_delay_sigma_s) {
