@@ -184,8 +184,9 @@ void judge_clock(const ClockReport& clock, const std::string& what, Findings* fi
   }
   if (clock.counters.delay_steps > 0) {
     add_advice(findings,
-               fmt::format("{}: the shortest delay changed by {:.1f} ms, which is reported but not "
-                           "corrected; look for a changed route or a buffer that filled up",
+               fmt::format("{}: a step of the delay: the least delay or the sender's clock moved "
+                           "by {:.1f} ms, which is not corrected; look for a changed route, a "
+                           "buffer that filled up, or what sets the camera's clock",
                            what, 1e3 * clock.delay_shift_s));
   }
 }

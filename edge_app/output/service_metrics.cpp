@@ -286,7 +286,8 @@ std::string service_metrics(const HttpApiSources& sources, const HttpCounters& h
   out.add(summary.repeated);
   out.counter("alidade_video_clock_restarts_total", "Starts of the video's clock filter anew");
   out.add(summary.clock_restarts);
-  out.counter("alidade_video_clock_floor_shifts_total", "Steps of the video's least delay");
+  out.counter("alidade_video_clock_floor_shifts_total",
+              "Steps of the delay: the video's least delay or the sender's clock moved");
   out.add(summary.delay_steps);
   out.gauge("alidade_video_clock_wander_seconds",
             "By how much time stamps and arrivals wander against each other");

@@ -59,8 +59,11 @@ void RecordLog::log_clock(const OutputMessage& message) {
     spdlog::info("{}: clock filter restarted at frame {}", video_.name(), *message.record.frame);
   }
   if (events.video_delay_stepped) {
-    spdlog::warn("{}: the least delay of the video stepped at frame {}; not followed",
-                 video_.name(), *message.record.frame);
+    spdlog::warn(
+        "{}: a step of the delay at frame {}: the video's least delay or the sender's clock moved "
+        "by {:.1f} ms, which of the two cannot be told; a picture's time is known to that only, "
+        "until the clock offset is found anew",
+        video_.name(), *message.record.frame, 1e3 * events.video_moved_s);
   }
   if (events.zoom_contradicted) {
     spdlog::warn(

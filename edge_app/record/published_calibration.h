@@ -18,6 +18,9 @@ struct PublishedCalibration {
   MapState map;             // may be empty
   std::string name;         // for people: a file, "data sheet", "live"
   ZoomCurve zoom_curve;     // for other zooms, and while the zoom moves; may be empty
+  // Its clock offset was found through the present connection. False: perhaps through another one,
+  // whose least delay may differ.
+  bool of_this_connection = true;
 };
 
 // Prepares a map from before a restart, or of another zoom, for use now. Such a map knows the base

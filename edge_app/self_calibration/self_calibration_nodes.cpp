@@ -136,13 +136,14 @@ void SelfCalibration::look_for_stored() {
   if (is_rejected(found->calibration)) return;
   found->calibrated = true;
   found->zoom_curve = nodes_.curve();
+  // For a stored one the connection is unknown.
+  found->of_this_connection = by_curve && nodes_.clock_is_known();
   messages_.push_back(fmt::format("zoom {}: the calibration {} holds", *zoom_, found->name));
   published_ = next_ = found;
   fresh_wanted_ = false;
   doubtful_ = false;
   if (!makes_nodes()) contradiction_.restart();
-  // For a stored one the connection is unknown.
-  clock_offset_known_ = by_curve && nodes_.clock_is_known();
+  clock_offset_known_ = found->of_this_connection;
   watch_interval_s_ =
       makes_nodes() ? options_.schedule.next_try_s : options_.schedule.first_watch_s;
   need_ = CalibrationNeed::kNothing;

@@ -37,7 +37,7 @@ struct FrameTracks {
   bool time_is_of_use = true;
   Tracker tracker = Tracker::kNone;
   bool clock_restarted = false;    // the frame clock restarted with this frame
-  bool delay_stepped = false;      // the least delay of the video stepped
+  bool delay_stepped = false;      // the least delay of the video, or the sender's clock, stepped
   double delay_wander_s = 0;       // s, by how much the video's delay wanders; 0: it does not
   bool telemetry_too_old = false;  // the frame lies beyond max_extrapolation_s
   OeStatus oe_status = OeStatus::kNoPrediction;  // set if tracker is kOe

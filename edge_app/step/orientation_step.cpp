@@ -128,7 +128,12 @@ void OrientationStep::adopt(const PublishedCalibration& published) {
   now_.calibrated = published.calibrated;
   now_.zoom_curve = published.zoom_curve;
   zoom_.note_adoption();
-  minimum_delay_sigma_s_ = 0;
+  // A withdrawn calibration's clock offset stays in use.
+  if (!published.of_this_connection) {
+    minimum_delay_sigma_s_ = std::max(minimum_delay_sigma_s_, connections_sigma_s_);
+  } else if (published.calibrated) {
+    minimum_delay_sigma_s_ = 0;
+  }
   note_curve_here();
   if (oe_ && !keep) oe_->reset(published.calibration, published.map, focal_length());
 }
@@ -154,6 +159,7 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
   const ClockEstimate& clock = frame_time.clock;
   events->video_clock_restarted = clock.restarted;
   events->video_delay_stepped = clock.delay_stepped;
+  events->video_moved_s = frame_time.moved_s;
   events->video_delay_wander_s = frame_time.wander_s;
   events->stamps_left_out = frame_time.stamp_rate_error;
   events->stamps_count = frame_time.stamps_count;

@@ -72,7 +72,8 @@ struct OrientationStepOptions {
 // What a frame brought to light, for the log.
 struct StepEvents {
   bool video_clock_restarted = false;
-  bool video_delay_stepped = false;  // flagged, not followed
+  bool video_delay_stepped = false;  // or the sender's clock did; flagged, not followed
+  double video_moved_s = 0;          // by how much, at such a step or a restart
   // From this frame on images exclude the focal length of the zoom reading.
   bool zoom_contradicted = false;
   double video_delay_wander_s = 0;  // s, by how much the delay wanders; 0: it does not
@@ -188,9 +189,9 @@ class OrientationStep {
   std::unique_ptr<StartUpTracker> start_up_;  // null: nobody needs its points
   ZoomReadings zoom_;
   ReadLens lens_;
-  bool zoom_on_curve_ = false;  // the present zoom lies on the zoom curve
-  bool begins_here_ = false;    // and the curve is sharp enough there for a map to begin
-  double minimum_delay_sigma_s_ = 0;
+  bool zoom_on_curve_ = false;        // the present zoom lies on the zoom curve
+  bool begins_here_ = false;          // and the curve is sharp enough there for a map to begin
+  double minimum_delay_sigma_s_ = 0;  // of the calibration in use, against this connection
   // s: the part of a frame's time error that neighbouring frames share.
   double lasting_sigma_s_ = 0;
   RepeatedImages repeated_images_;

@@ -405,7 +405,7 @@ ReadStatus HttpPollingSource::read(PanTiltSample& sample, double timeout_s) {
 std::string take_http_url(Url* url, HttpPollingOptions* options) {
   std::string error;
   const bool is_url = parse_url(options->url, url, &error);
-  options->name = url->bare;
+  options->name = url->shown;
   options->configured = *url;
   if (!is_url) {
     return error;

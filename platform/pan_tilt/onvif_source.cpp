@@ -372,10 +372,10 @@ std::vector<std::string> OnvifConversation::notes() const {
   std::vector<std::string> notes = {scale_.note(status_)};
   if (!user_.empty()) notes.push_back(login_.note());
   if (options_.ptz_path.empty() && services_.ptz.empty()) {
-    notes.push_back("the device names no PTZ service; it is asked at " + ptz_.address());
+    notes.push_back("the device names no PTZ service; it is asked at " + shown_url(ptz_.address()));
   } else if (!ptz_.is_first()) {
     notes.push_back("no PTZ service answers where the device says, '" + shown_url(services_.ptz) +
-                    "'; it is asked at " + ptz_.address());
+                    "'; it is asked at " + shown_url(ptz_.address()));
   }
   return notes;
 }

@@ -61,7 +61,7 @@ std::string line_reason(int error) {
 
 bool is_device(const std::string& address) { return address.find("://") == std::string::npos; }
 
-// On false url->bare is what can be shown.
+// On false url->shown is what can be shown.
 bool parse_link_url(const std::string& text, Url* url) {
   std::string error;
   return parse_url(text, url, &error) && (url->scheme == "tcp" || url->scheme == "udp") &&
@@ -103,7 +103,7 @@ ByteLink::ByteLink(const ByteLinkOptions& options)
   Url url;
   const bool is_url = parse_link_url(address, &url);
   if (!is_url) {
-    options_.address = url.bare;
+    options_.address = url.shown;
     error_ = "expected a path such as /dev/ttyUSB0, or tcp://host:port, or udp://host:port";
     return;
   }

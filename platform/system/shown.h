@@ -24,12 +24,6 @@ namespace alidade {
   return escaped(text);
 }
 
-// A foreign address, without a password in it.
-[[nodiscard]] inline std::string shown_url(std::string_view url) {
-  constexpr std::size_t kMost = 120;  // bytes
-  return shown(url, kMost);
-}
-
 // Nine digits: a forged 1e300 is not printed with three hundred.
 [[nodiscard]] inline std::string shown(double number) {
   char text[32];

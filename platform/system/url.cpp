@@ -2,8 +2,10 @@
 
 #include <curl/curl.h>
 
+#include <algorithm>
+#include <array>
+#include <cctype>
 #include <memory>
-#include <string_view>
 
 #include "platform/system/shown.h"
 
@@ -31,6 +33,30 @@ std::string part(const Handle& handle, CURLUPart which, unsigned flags = 0) {
   return text;
 }
 
+// Keys of cameras: password, passphrase, loginpas, pwd, usr, user, access_token, api-key, auth ...
+// One in %XX may spell anything.
+bool is_secret(std::string_view key) {
+  constexpr std::array<std::string_view, 11> kWords = {
+      "pas", "pwd", "user", "usr", "login", "key", "auth", "secret", "token", "cred", "signature"};
+  std::string small(key);
+  std::transform(small.begin(), small.end(), small.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return small == "pw" || small.find('%') != std::string::npos ||
+         std::any_of(kWords.begin(), kWords.end(), [&small](std::string_view word) {
+           return small.find(word) != std::string::npos;
+         });
+}
+
+// A piece between two separators: key=value, or user=a_password=b, as some cameras have it.
+std::string piece_without_secrets(std::string_view piece) {
+  std::size_t key = 0;
+  for (std::size_t at = piece.find('='); at != std::string_view::npos; at = piece.find('=', key)) {
+    if (is_secret(piece.substr(key, at - key))) return std::string(piece.substr(0, at + 1)) + "***";
+    key = at + 1;
+  }
+  return std::string(piece);
+}
+
 }  // namespace
 
 bool parse_url(const std::string& text, Url* url, std::string* error) {
@@ -40,8 +66,8 @@ bool parse_url(const std::string& text, Url* url, std::string* error) {
     const std::size_t scheme_end = text.find("://");
     const std::size_t at = text.rfind('@');  // the text before it may be a password
     const std::string rest = at == std::string::npos ? text : "..." + text.substr(at);
-    url->bare =
-        shown(scheme_end == std::string::npos ? rest : text.substr(0, scheme_end) + "://...");
+    url->bare = url->shown = without_secrets(
+        shown(scheme_end == std::string::npos ? rest : text.substr(0, scheme_end) + "://..."));
     *error =
         "not a URL; it must look like scheme://host[:port]/path, special characters of a user or "
         "password written as %XX";
@@ -60,7 +86,24 @@ bool parse_url(const std::string& text, Url* url, std::string* error) {
   curl_url_set(handle.get(), CURLUPART_USER, nullptr, 0);
   curl_url_set(handle.get(), CURLUPART_PASSWORD, nullptr, 0);
   url->bare = part(handle, CURLUPART_URL, kAnyScheme);
+  url->shown = without_secrets(url->bare);
   return true;
+}
+
+std::string without_secrets(std::string_view url) {
+  std::string result;
+  while (true) {
+    const std::size_t end = url.find_first_of("?&;/#");
+    result += piece_without_secrets(url.substr(0, end));
+    if (end == std::string_view::npos) return result;
+    result += url[end];
+    url.remove_prefix(end + 1);
+  }
+}
+
+std::string shown_url(std::string_view url) {
+  constexpr std::size_t kMost = 120;  // bytes
+  return shown(without_secrets(url), kMost);
 }
 
 bool is_by_tls(std::string_view url_or_scheme) {

@@ -1,5 +1,7 @@
 #pragma once
 // Splits a URL (with libcurl) so that the password can be kept apart from what is shown and logged.
+// `bare` is for connecting: cameras take passwords in a query, too. Whoever shows or logs a URL
+// shows `shown`, or shown_url() of a foreign one.
 
 #include <string>
 #include <string_view>
@@ -13,11 +15,19 @@ struct Url {
   std::string path;      // with its leading '/', and the query
   std::string user;      // decoded
   std::string password;  // decoded
-  std::string bare;      // the URL without user and password
+  std::string bare;      // the URL without user and password; its query may hold some
+  std::string shown;     // bare without_secrets(); of what is no URL the part that may be shown
 };
 
-// On false, text is not a URL, *error says so, and url->bare is the part that may be shown.
+// On false, text is not a URL, *error says so, and url->bare is url->shown.
 [[nodiscard]] bool parse_url(const std::string& text, Url* url, std::string* error);
+
+// "***" in place of each value whose key sounds like a secret (password, pwd, token, user ...):
+// srt://h:1?passphrase=***. A value ends at the next of ? & ; / #.
+[[nodiscard]] std::string without_secrets(std::string_view url);
+
+// A foreign address for messages: its first 120 bytes, escaped, without_secrets().
+[[nodiscard]] std::string shown_url(std::string_view url);
 
 // True if the URL's scheme, or the scheme alone, is one over TLS: https, rtsps, mqtts.
 [[nodiscard]] bool is_by_tls(std::string_view url_or_scheme);

@@ -88,7 +88,7 @@ MjpegSource::MjpegSource(const MjpegSourceOptions& options) : options_(options) 
   Url url;
   std::string error;
   const bool is_url = parse_url(options.url, &url, &error);
-  name_ = url.bare;
+  name_ = url.shown;
   if (!is_url) {
     (void)fail(error);
     return;

@@ -40,6 +40,7 @@ class RtpSource : public FrameSource {
     if (options_.url.rfind("rtp://@:", 0) == 0) {
       options_.url.replace(0, 8, "rtp://0.0.0.0:");
     }
+    name_ = options_.url;
     check();
   }
 
@@ -52,7 +53,7 @@ class RtpSource : public FrameSource {
     return true;
   }
   std::string error() const override { return error_; }
-  std::string name() const override { return options_.url; }
+  std::string name() const override { return name_; }
   FrameSourceCounters counters() const override {
     return {damaged_, thread_.dropped(), unstamped_, foreign_packets_, garbage_bytes_};
   }
@@ -80,7 +81,7 @@ class RtpSource : public FrameSource {
   void interrupt();
   void push(Arrived arrived);
   ReadStatus fail(std::string error) {
-    error_ = options_.url + ": " + std::move(error);
+    error_ = name_ + ": " + std::move(error);
     failed_ = true;
     return ReadStatus::kFailed;
   }
@@ -98,6 +99,7 @@ class RtpSource : public FrameSource {
   void spoil();
 
   RtpSourceOptions options_;
+  std::string name_;  // as shown: its query may hold a password
 
   std::atomic<std::int64_t> damaged_{0};
   std::atomic<std::int64_t> unstamped_{0};
@@ -150,6 +152,7 @@ void RtpSource::check() {
   std::string error;
   const bool is_url = parse_url(options_.url, &url, &error);
   options_.url = url.bare;
+  name_ = url.shown;
   if (!is_url) {
     (void)fail(error);
     return;
@@ -203,7 +206,7 @@ std::string RtpSource::waiting() const {
                 "waiting for a key frame since %.0f s; set a shorter interval of key frames (GOP) "
                 "in the camera",
                 std::floor(waited_s));
-  return options_.url + ": " + text;
+  return name_ + ": " + text;
 }
 
 // One connection from start to end.
@@ -244,7 +247,7 @@ void RtpSource::count(const RtpConnection& connection) {
   unstamped_ += now.unstamped - counted_.unstamped;
   foreign_packets_ += now.foreign_packets - counted_.foreign_packets;
   garbage_bytes_ += now.garbage_bytes - counted_.garbage_bytes;
-  const std::string of = options_.url + ": ";
+  const std::string of = name_ + ": ";
   if (now.foreign_packets > counted_.foreign_packets) {
     remarks_.say(kForeignPackets, of + "packets of " + connection.foreign_kind() +
                                       " come between those of the video; the session did not "
@@ -274,7 +277,7 @@ ReadStatus RtpSource::read(Frame& frame, double timeout_s) {
   return thread_.read(
       timeout_s, [&](auto arrived) { return deliver(std::move(arrived), frame); },
       [&](const std::string& error) {
-        error_ = options_.url + ": " + error;
+        error_ = name_ + ": " + error;
         restarted_ = true;
         no_key_after_loss_since_s_ = -1;
       },

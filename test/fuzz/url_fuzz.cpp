@@ -12,10 +12,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   std::string error;
   if (!parse_url(text, &url, &error)) {
     FUZZ_REQUIRE(is_one_line(error));
-    FUZZ_REQUIRE(url.bare.empty() || is_one_line(url.bare));
+    FUZZ_REQUIRE(url.shown.empty() || is_one_line(url.shown));
     return 0;
   }
-  FUZZ_REQUIRE(is_one_line(url.bare));
+  FUZZ_REQUIRE(is_one_line(url.shown));
   Url bare;
   // Not always: what libcurl accepts it need not write so that it accepts it again (file:A//%tmp).
   if (!parse_url(url.bare, &bare, &error)) return 0;

@@ -352,6 +352,28 @@ TEST_F(FrameClockTest, AStepOfTheDelayIsNotKnownToBeTheDelays) {
   EXPECT_NEAR(moved_s, 0.03, 1e-3);
 }
 
+// As by a camera whose clock is put forward or back by one picture: too little for a restart.
+TEST_F(FrameClockTest, AStepOfTheSendersClockShowsAsAStepOfTheDelay) {
+  for (const double step_s : {0.04, -0.03}) {
+    clock_ = FrameClock{ClockFilterOptions{}, 5e-3, true};
+    play(0, 20);
+    std::optional<double> noticed_s;
+    double moved_s = 0;
+    for (double t = 20; t < 40; t += kInterval_s) {
+      const FrameTime time = add(t + step_s, t);
+      EXPECT_TRUE(time.known && !time.clock.rejected && !time.clock.restarted) << t;
+      EXPECT_NEAR(time.clock.time_s, t, 5 * time.clock.sigma_s) << t;
+      if (!time.clock.delay_stepped) continue;
+      EXPECT_FALSE(noticed_s) << "once";
+      noticed_s = t;
+      moved_s = time.moved_s;
+    }
+    ASSERT_TRUE(noticed_s) << step_s;
+    EXPECT_LE(*noticed_s, 31);
+    EXPECT_NEAR(moved_s, std::abs(step_s), 1e-3);
+  }
+}
+
 TEST_F(FrameClockTest, WhatWaitedTellsNothingOfTheDelay) {
   play(0, 15);
   for (const double stall_s : {15.0, 20.0}) {

@@ -488,6 +488,30 @@ TEST(SelfCalibration, KeepsOneCalibrationForEachZoom) {
   expect_truth(wide, back[0].calibration->calibration);
 }
 
+TEST(SelfCalibration, WhatIsStoredForAZoomMayBeOfAnotherConnection) {
+  MemoryArchive archive;
+  for (const double zoom : {100.0, 900.0}) {
+    StoredCalibration stored;
+    stored.calibration.camera = {20 * zoom, 1, {0}, 1920, 1080};
+    stored.calibration.zoom = zoom;
+    archive.stored_.push_back(stored);
+  }
+  SelfCalibration calibration(options_for(camera()), &archive);
+  PanTiltSample sample;
+  for (const double zoom : {100.0, 900.0}) {
+    sample.zoom = zoom;
+    std::shared_ptr<const PublishedCalibration> published;
+    for (int i = 0; i < 50; ++i) {
+      sample.latest_time_s += 0.04;
+      calibration.add(sample);
+      if (auto news = calibration.work()) published = news;
+    }
+    ASSERT_TRUE(published) << zoom;
+    EXPECT_EQ(published->calibration.zoom, zoom);
+    EXPECT_FALSE(published->of_this_connection);
+  }
+}
+
 TEST(SelfCalibration, BeginsWithWhatIsStored) {
   MemoryArchive archive;
   StoredCalibration stored;

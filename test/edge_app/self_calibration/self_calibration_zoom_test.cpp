@@ -171,6 +171,7 @@ TEST_F(ZoomingCamera, AVisitOfANodeIsAnotherOne) {
   EXPECT_LT(back[0].time_s, 0.5) << "with the first readings";
   EXPECT_TRUE(back[0].calibration->calibrated);
   EXPECT_EQ(back[0].calibration->name, "zoom curve");
+  EXPECT_TRUE(back[0].calibration->of_this_connection);
   EXPECT_LT(
       std::abs(std::log(back[0].calibration->calibration.camera.focal_length / again.focal_length)),
       4 * kRepeatability);

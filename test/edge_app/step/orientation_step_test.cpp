@@ -1144,6 +1144,30 @@ INSTANTIATE_TEST_SUITE_P(
         FalseStamps{"OnePercentFast", [](int, double t) { return 1.01 * t; }}),
     [](const auto& one) { return one.param.name; });
 
+// d is of the delay before the step, so sigma holds the step until a calibration of the time after it.
+TEST(OrientationStep, TellsAStepOfTheSendersClockWithItsSize) {
+  OrientationStepOptions options = options_without_offsets();
+  options.wait_for_pace = true;
+  OrientationStep step(options);
+  int steps = 0;
+  OrientationRecord record;
+  for (int i = 0; i < 25 * 120; ++i) {
+    const double time_s = 0.04 * i;
+    FrameStamp stamp = stamp_at(time_s, i);
+    stamp.sender_time_s = 5000 + time_s + (time_s > 20 ? 0.04 : 0);
+    stamp.restarted = i == 0;
+    StepEvents events;
+    record = step.add_frame(stamp, ImageView{}, &events);
+    EXPECT_FALSE(events.video_clock_restarted) << time_s;
+    if (!events.video_delay_stepped) continue;
+    ++steps;
+    EXPECT_NEAR(events.video_moved_s, 0.04, 1e-3);
+    EXPECT_LE(time_s, 31);
+  }
+  EXPECT_EQ(steps, 1);
+  EXPECT_GE(record.time_sigma_s, 0.04) << "long after the clock itself is at rest";
+}
+
 // The line's error and that of the least delay below it.
 TEST_F(OeStepTest, TheTimesSigmaIsThatOfTwoIndependentErrors) {
   const auto sigma_after_a_reconnection = [](double minimum_delay_sigma_s) {
@@ -1170,6 +1194,7 @@ TEST_F(OeStepTest, ANewConnectionsDelayIsLessSureUntilACalibrationOfIt) {
   moving.oe.reset();
   OrientationStep step(moving);
   Sweep sweep;
+  sweep.tilt_rate = 0;
   const auto sigma = [&](int first, bool reconnected) {
     OrientationRecord record;
     for (int i = first; i < first + 100; ++i) {
@@ -1191,8 +1216,23 @@ TEST_F(OeStepTest, ANewConnectionsDelayIsLessSureUntilACalibrationOfIt) {
   PublishedCalibration published;
   published.calibration = moving.calibration;
   published.calibrated = true;
+  // As stored for another zoom: its d is of another connection, too.
+  published.of_this_connection = false;
   step.adopt(published);
-  EXPECT_LT(sigma(200, false), 1.05 * before) << "the clock itself is known better by now";
+  EXPECT_GT(sigma(200, false), 0.95 * after);
+  PublishedCalibration withdrawn = published;
+  withdrawn.calibrated = false;
+  withdrawn.of_this_connection = true;
+  step.adopt(withdrawn);
+  EXPECT_GT(sigma(300, false), 0.95 * after) << "its d stays in use";
+  published.of_this_connection = true;
+  step.adopt(published);
+  EXPECT_LT(sigma(400, false), 1.05 * before) << "the clock itself is known better by now";
+  // Without a reconnection: what is stored was found before.
+  published.of_this_connection = false;
+  step.adopt(published);
+  EXPECT_NEAR(std::sqrt(std::pow(sigma(500, false), 2) - before * before), expected,
+              0.1 * expected);
 }
 
 }  // namespace

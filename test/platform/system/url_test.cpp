@@ -3,9 +3,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <utility>
+
 namespace alidade {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -20,6 +23,34 @@ TEST(Url, KeepsThePasswordApartFromWhatIsShown) {
   EXPECT_EQ(url.user, "user");
   EXPECT_EQ(url.password, "p@ss:");
   EXPECT_EQ(url.bare, "rtsp://camera:8554/a/b?x=1");
+}
+
+// As cameras and SRT take them: in the query, or in place of a path.
+TEST(Url, ShowsNoSecretOfAQuery) {
+  const std::pair<const char*, const char*> cases[] = {
+      {"srt://h:9000?passphrase=hidden&latency=20", "passphrase=***&latency=20"},
+      {"http://h/video.cgi?loginuse=hidden&loginpas=hidden", "loginuse=***&loginpas=***"},
+      {"rtsp://h:554/live?channel=1&user=hidden&pwd=hidden#x", "?channel=1&user=***&pwd=***#x"},
+      {"rtsp://h/user=hidden_password=hidden_channel=1", "/user=***"},
+      {"rtsp://h/channel=1_password=hidden&stream=0.sdp", "/channel=1_password=***&stream=0.sdp"},
+      {"http://h/x?API-Key=hidden;size=4", "?API-Key=***;size=4"},
+      {"http://h/x?access_token=hidden=hidden", "?access_token=***"},
+      {"http://h/x?p%61ss=hidden", "?p%61ss=***"},
+      {"http://h/x?pw=hidden&size=640x480", "?pw=***&size=640x480"}};
+  for (const auto& [text, seen] : cases) {
+    Url url;
+    std::string error;
+    ASSERT_TRUE(parse_url(text, &url, &error)) << text << error;
+    EXPECT_THAT(url.shown, AllOf(HasSubstr(seen), Not(HasSubstr("hidden"))));
+    EXPECT_THAT(url.bare, HasSubstr("hidden")) << "the camera needs it";
+    EXPECT_THAT(shown_url(text), Not(HasSubstr("hidden")));
+  }
+  Url url;
+  std::string error;
+  ASSERT_TRUE(parse_url("rtsp://h/a?x=1&y=2", &url, &error));
+  EXPECT_EQ(url.shown, url.bare);
+  EXPECT_FALSE(parse_url("a@h/x?pwd=hidden", &url, &error));
+  EXPECT_THAT(url.shown + url.bare + error, Not(HasSubstr("hidden")));
 }
 
 TEST(Url, ShowsNoPasswordOfAUrlItCannotParse) {

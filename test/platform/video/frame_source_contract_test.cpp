@@ -127,6 +127,20 @@ std::vector<FrameSourceCase<Rig>> live_cases(Patience patience) {
           {"Mjpeg", [patience] { return std::make_unique<MjpegRig>(patience); }}};
 }
 
+// Neither where it names itself nor where it says what failed.
+TEST(FrameSourceNames, HoldNoSecretOfAQuery) {
+  MjpegSourceOptions mjpeg;
+  mjpeg.url = "http://127.0.0.1:1/video?user=secret&pwd=secret&size=4";
+  RtpSourceOptions rtsp;
+  rtsp.url = "rtsp://127.0.0.1:1/live?user=secret&pwd=secret&size=4";
+  Frame frame;
+  for (const auto& source : {open_mjpeg(mjpeg), open_rtp(rtsp)}) {
+    EXPECT_NE(source->name().find("?user=***&pwd=***&size=4"), std::string::npos) << source->name();
+    ASSERT_EQ(read_until(*source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+    EXPECT_EQ(source->error().find("secret"), std::string::npos) << source->error();
+  }
+}
+
 const auto name_of = [](const auto& which) { return which.param.name; };
 
 INSTANTIATE_TEST_SUITE_P(Network, FrameSourceContract,
