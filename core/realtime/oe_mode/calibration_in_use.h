@@ -80,8 +80,8 @@ class CalibrationInUse {
   }
 
   // zoom, zoom_rate: as solved. The frame's camera has the correction.
-  [[nodiscard]] LearntLens learn(double time_s, const SolvedZoom& zoom, double zoom_rate,
-                                 const LensScale& scale) {
+  [[nodiscard]] OwnLens learn(double time_s, const SolvedZoom& zoom, double zoom_rate,
+                              const LensScale& scale) {
     return lens_.learn(time_s, zoom, of_frame_.camera.focal_length, zoom_rate, scale);
   }
   // Sets of_answer(): for a frame without landmarks, as long as none hold ...

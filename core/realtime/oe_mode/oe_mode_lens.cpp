@@ -144,11 +144,10 @@ OeMode::Solution OeMode::look_for_moved_lens(const Solution& first,
 void OeMode::learn_own_lens(const Solution& solution, double zoom_rate) {
   const SolvedZoom& zoom = solution.solved.zoom;
   set_camera(zoomed(solution.camera, zoom.correction[0]));
-  const LearntLens learnt = calibration_.learn(frame_.time_s, zoom, zoom_rate, offset_.lens());
-  frame_.lens = learnt.lens;
+  frame_.lens = calibration_.learn(frame_.time_s, zoom, zoom_rate, offset_.lens());
   frame_.lens.zoom = map_.zoom_of(camera().focal_length);
   statistics_.own_lens = true;
-  statistics_.reading_sigmas = learnt.reading_sigmas;
+  statistics_.reading_sigmas = frame_.lens.reading_sigmas;
 }
 
 // Once it shows in the image, puts what is known of the lens into the calibration, and moves all
