@@ -31,12 +31,13 @@ std::string describe(const Calibration& c) {
 SelfCalibration::SelfCalibration(const SelfCalibrationOptions& options, CalibrationArchive* archive)
     : options_(options),
       archive_(archive),
+      streams_(options.schedule),
       session_(options.session),
-      steady_zoom_(options.zoom_tolerance),
+      pace_(options.schedule),
+      zoom_(options.zoom_tolerance, options.schedule),
       zooms_(options.zooms),
       contradiction_(options.contradiction),
-      disagreement_(options.disagreement),
-      watch_interval_s_(options.schedule.first_watch_s) {
+      disagreement_(options.disagreement) {
   auto first = std::make_shared<PublishedCalibration>();
   const StoredCalibration* stored = archive != nullptr ? archive->find(std::nullopt) : nullptr;
   if (stored != nullptr) {
@@ -55,39 +56,24 @@ SelfCalibration::SelfCalibration(const SelfCalibrationOptions& options, Calibrat
   }
   zooms_ = zooms_ || !nodes_.empty();
   first->zoom_curve = nodes_.curve();
-  published_ = first;
-  // It was made over another connection.
-  clock_offset_known_ = stored == nullptr;
-}
-
-void SelfCalibration::say_once(const std::string& line) {
-  if (line == said_) return;
-  said_ = line;
-  messages_.push_back(line);
+  // A stored one was made over another connection.
+  publication_.begin_with(first, stored == nullptr);
 }
 
 void SelfCalibration::begin_anew() {
   session_.clear();
   first_node_is_wanted_ = false;
-  tries_ = 0;
+  pace_.begin_anew();
   disagreement_.restart();
 }
 
 void SelfCalibration::begin_fresh() {
   begin_anew();
-  fresh_wanted_ = is_calibrated_here();
-}
-
-bool SelfCalibration::zoom_fits(const std::optional<double>& wanted) const {
-  return !zoom_ || !wanted || std::abs(*zoom_ - *wanted) <= steady_zoom_.tolerance();
+  publication_.want_fresh(is_calibrated_here());
 }
 
 bool SelfCalibration::is_calibrated_here() const {
-  return published_->calibrated && zoom_fits(published_->calibration.zoom);
-}
-
-bool SelfCalibration::is_rejected(const Calibration& calibration) const {
-  return std::find(rejected_.begin(), rejected_.end(), *calibration.zoom) != rejected_.end();
+  return publication_.object()->calibrated && zoom_.fits(publication_.calibration().zoom);
 }
 
 void SelfCalibration::clock_began_anew() {
@@ -96,22 +82,19 @@ void SelfCalibration::clock_began_anew() {
 }
 
 bool SelfCalibration::judge_delay(const FrameTracks& tracks) {
-  constexpr double kSteady = 0.5;  // of the limit: wander fades slowly
-  const double most_s = options_.schedule.most_wander_s;
-  const bool wanders = tracks.delay_wander_s > (delay_wanders_ ? kSteady * most_s : most_s);
-  if (wanders != delay_wanders_) {
-    messages_.push_back(
-        wanders
+  if (streams_.judge_delay(tracks)) {
+    messages_.say(
+        streams_.delay_wanders()
             ? fmt::format("the video's delay, or its time stamps, wander by {:.0f} ms and more, "
                           "as behind a relay: nothing is calibrated and nothing withdrawn until "
                           "they hold; the camera itself would be better read directly",
                           1e3 * tracks.delay_wander_s)
             : "the video's delay holds again; the clock offset is found anew");
     begin_anew();
-    clock_offset_known_ = false;
+    publication_.clock_began_anew();
     clock_began_anew();
   }
-  return delay_wanders_ = wanders;
+  return streams_.delay_wanders();
 }
 
 void SelfCalibration::judge_agreement(const FrameTracks& tracks) {
@@ -120,53 +103,39 @@ void SelfCalibration::judge_agreement(const FrameTracks& tracks) {
   if (!disagreement_.judge(tracks.stamp.receive_time_s, contradicted)) return;
   if (!options_.automatic) {
     // Nothing would take its place.
-    say_once(
+    messages_.say_once(
         fmt::format("landmarks contradict telemetry in half of the frames (was the camera "
                     "moved on its mount, or its lens?); the calibration {} stays in use, as "
                     "calibration.auto is false: calibrate again",
-                    published_->name));
+                    publication_.object()->name));
     disagreement_.restart();
     return;
   }
   auto withdrawn = std::make_shared<PublishedCalibration>();
-  withdrawn->calibration = published_->calibration;
+  withdrawn->calibration = publication_.calibration();
   withdrawn->calibration.covariance = options_.data_sheet.covariance;
-  withdrawn->name = published_->name + ", withdrawn";
-  messages_.push_back(
-      fmt::format("landmarks contradict telemetry in {} of {} frames: the calibration {} is "
-                  "withdrawn (was the camera moved on its mount, or its lens?); calibrating anew",
-                  disagreement_.contradicted_frames(), disagreement_.frames(), published_->name));
-  if (published_->calibration.zoom) rejected_.push_back(*published_->calibration.zoom);
-  published_ = next_ = withdrawn;
-  doubtful_ = true;
+  withdrawn->name = publication_.object()->name + ", withdrawn";
+  messages_.say(fmt::format(
+      "landmarks contradict telemetry in {} of {} frames: the calibration {} is "
+      "withdrawn (was the camera moved on its mount, or its lens?); calibrating anew",
+      disagreement_.contradicted_frames(), disagreement_.frames(), publication_.object()->name));
+  publication_.withdraw(withdrawn);
   begin_anew();
 }
 
 bool SelfCalibration::storing_is_due() const {
   return archive_ != nullptr && archive_->has_pending() &&
-         now_s_ > last_store_s_ + options_.schedule.store_retry_s;
+         streams_.now_s() > last_store_s_ + options_.schedule.store_retry_s;
 }
 
 bool SelfCalibration::adjusting_is_due() const {
-  const CalibrationSchedule& schedule = options_.schedule;
   if (cancelled_) return false;
-  if (!options_.automatic || session_.frames() < 3 ||
-      now_s_ < zoom_changed_s_ + schedule.zoom_settles_s) {
+  if (!options_.automatic || session_.frames() < 3 || !zoom_.has_settled(streams_.now_s())) {
     return false;
   }
-  const double newest_s = session_.newest_s();
-  if (!is_calibrated_here() || fresh_wanted_) {
-    const double pause_s = tries_ < schedule.many_tries ? schedule.next_try_s : schedule.slow_try_s;
-    return session_.span_s() >= schedule.first_try_s &&
-           (tries_ == 0 || newest_s >= last_try_s_ + pause_s);
-  }
-  if (makes_nodes() && !nodes_.has_visit()) {
-    return session_.span_s() >= schedule.first_try_s && newest_s >= last_try_s_ + watch_interval_s_;
-  }
-  return session_.span_s() >= schedule.watch_window_s &&
-         newest_s >= began_s_ + schedule.watch_window_s &&
-         newest_s >=
-             last_try_s_ + (clock_offset_known_ ? watch_interval_s_ : schedule.first_watch_s);
+  if (!is_calibrated_here() || publication_.is_fresh_wanted()) return pace_.first_is_due(session_);
+  if (makes_nodes() && !nodes_.has_visit()) return pace_.node_is_due(session_);
+  return pace_.watch_is_due(session_, !publication_.clock_holds());
 }
 
 CheckedCalibration SelfCalibration::adjust(const Calibration* known, bool free_centre) const {
@@ -183,15 +152,15 @@ CheckedCalibration SelfCalibration::adjust(const Calibration* known, bool free_c
   if (known == nullptr) {
     checked = calibrate_session(session_, options, nullptr);
   } else {
-    const KnownCalibration prior{*known, clock_offset_known_};
+    const KnownCalibration prior{*known, publication_.clock_holds()};
     checked = calibrate_session(session_, options, &prior);
   }
-  checked.result.calibration.zoom = zoom_;
+  checked.result.calibration.zoom = zoom_.reading();
   return checked;
 }
 
 void SelfCalibration::store(const CalibrationResult& result, const MapState& map) {
-  last_store_s_ = now_s_;
+  last_store_s_ = streams_.now_s();
   if (archive_ == nullptr) return;
   StoredCalibration stored;
   stored.calibration = result.calibration;
@@ -200,7 +169,7 @@ void SelfCalibration::store(const CalibrationResult& result, const MapState& map
   stored.notes.zoom_curve = nodes_.curve();
   stored.map = map;
   std::string error;
-  if (!archive_->save(stored, &error)) messages_.push_back(error + "; kept, will be tried again");
+  if (!archive_->save(stored, &error)) messages_.say(error + "; kept, will be tried again");
 }
 
 void SelfCalibration::publish(const CheckedCalibration& checked) {
@@ -211,31 +180,26 @@ void SelfCalibration::publish(const CheckedCalibration& checked) {
   fresh->name = "live";
   fresh->zoom_curve = nodes_.curve();
   const CalibrationQuality& quality = checked.result.quality;
-  messages_.push_back(
+  messages_.say(
       fmt::format("calibrated from {} frames, {} landmarks: {}; residuals {:.2f} of the tracker's "
                   "noise, {:.2f} "
                   "in frames held out; map of {} landmarks",
                   quality.frames, quality.landmarks, describe(fresh->calibration),
                   quality.pixel_sigma_ratio, checked.hold_out, fresh->map.landmarks.size()));
-  messages_.insert(messages_.end(), checked.remarks.begin(), checked.remarks.end());
+  for (const std::string& remark : checked.remarks) messages_.say(remark);
   store(checked.result, fresh->map);
-  rejected_.erase(std::remove_if(rejected_.begin(), rejected_.end(),
-                                 [this](double zoom) { return zoom_fits(zoom); }),
-                  rejected_.end());
-  published_ = next_ = fresh;
-  doubtful_ = false;
-  clock_offset_known_ = true;
-  fresh_wanted_ = false;
-  said_.clear();
+  publication_.accept([this](double zoom) { return zoom_.fits(zoom); });
+  publication_.replace(fresh, true);
+  messages_.forget_said();
   need_ = CalibrationNeed::kNothing;
 }
 
 // Calibrates without an earlier calibration as prior.
 void SelfCalibration::try_first() {
-  ++tries_;
+  pace_.note_first();
   CheckedCalibration checked = adjust(nullptr);
   if (checked.refusal.empty()) {
-    watch_interval_s_ = options_.schedule.first_watch_s;
+    pace_.watch_soon();
     settle(std::move(checked));
     return;
   }
@@ -243,26 +207,26 @@ void SelfCalibration::try_first() {
   if (checked.result.status == CalibrationStatus::kCancelled) return;
   const CalibrationRefusal refusal = why_refused(checked, session_.frames());
   need_ = refusal.need;
-  say_once((fresh_wanted_ ? "no fresh calibration yet" : "not calibrated yet") + refusal.why);
+  messages_.say_once(
+      (publication_.is_fresh_wanted() ? "no fresh calibration yet" : "not calibrated yet") +
+      refusal.why);
 }
 
 void SelfCalibration::hold_against_published() {
-  const CalibrationSchedule& schedule = options_.schedule;
-  watch_interval_s_ = std::min(2 * watch_interval_s_, schedule.longest_watch_s);
+  pace_.watch_later();
   CheckedCalibration alone = adjust(nullptr);
   // Insufficient motion says nothing against what is known.
   if (!alone.refusal.empty()) return;
-  const double chi_square =
-      difference_chi_square(published_->calibration, alone.result.calibration, clock_offset_known_);
+  const double chi_square = difference_chi_square(
+      publication_.calibration(), alone.result.calibration, publication_.clock_holds());
   // A reading that agrees with itself says nothing about the curve.
   const bool agrees = makes_nodes() && chi_square <= options_.contradiction.least_chi_square;
   const ContradictionJudge::Verdict verdict =
       agrees ? ContradictionJudge::Verdict::kAgrees : contradiction_.judge(chi_square);
   if (verdict != ContradictionJudge::Verdict::kAgrees) {
-    watch_interval_s_ = schedule.first_watch_s;
-    messages_.push_back(
-        fmt::format("the camera is not what the calibration says (chi-square {:.0f}): {}",
-                    chi_square, describe(alone.result.calibration)));
+    pace_.watch_soon();
+    messages_.say(fmt::format("the camera is not what the calibration says (chi-square {:.0f}): {}",
+                              chi_square, describe(alone.result.calibration)));
     if (verdict != ContradictionJudge::Verdict::kBelieved) return;
     contradiction_.restart();
     if (makes_nodes()) {
@@ -280,45 +244,40 @@ void SelfCalibration::hold_against_published() {
   }
   if (!first_node_ || !first_node_->refusal.empty()) first_node_is_wanted_ = true;
   alone = {};  // frees a megabyte
-  const CheckedCalibration refined = adjust(&published_->calibration);
+  const CheckedCalibration refined = adjust(&publication_.calibration());
   if (!refined.refusal.empty()) return;
-  if (!clock_offset_known_ ||
-      is_sharper(refined.result.calibration, published_->calibration, schedule.worth_publishing)) {
+  if (!publication_.clock_holds() ||
+      is_sharper(refined.result.calibration, publication_.calibration(),
+                 options_.schedule.worth_publishing)) {
     publish(refined);
     first_node_is_wanted_ = true;
   }
 }
 
 void SelfCalibration::add(const FrameTracks& tracks) {
-  now_s_ = std::max(now_s_, tracks.stamp.receive_time_s);
-  last_frame_s_ = tracks.stamp.receive_time_s;
-  video_is_lost_ = false;
+  streams_.add(tracks);
   // Frames before and after have different clock offsets.
   if (tracks.clock_restarted || tracks.delay_stepped) {
     if (!session_.empty()) begin_anew();
-    if (is_calibrated_here()) clock_offset_known_ = false;
+    if (is_calibrated_here()) publication_.clock_began_anew();
     clock_began_anew();
   }
-  telemetry_is_old_ = old_telemetry_.judge(now_s_, tracks.telemetry_too_old);
   if (judge_delay(tracks)) return;
   judge_agreement(tracks);
   if (tracks.tracker == FrameTracks::Tracker::kNone || !tracks.time_is_of_use) return;
   // On an overloaded machine, frames of the previous zoom may come after the new reading.
-  if (tracks.stamp.receive_time_s < zoom_changed_s_ + options_.schedule.zoom_settles_s) return;
+  if (!zoom_.has_settled(tracks.stamp.receive_time_s)) return;
   if (tracks.tracker != tracker_) {
     begin_anew();
     tracker_ = tracks.tracker;
   }
   if (fresh_asked_.exchange(false)) begin_fresh();
-  if (session_.empty()) {
-    began_s_ = tracks.stamp.receive_time_s;
-    last_try_s_ = began_s_;
-  }
+  if (session_.empty()) pace_.begin(tracks.stamp.receive_time_s);
   session_.add(tracks);
 }
 
 bool SelfCalibration::wants_keyframe() const {
-  return options_.automatic && session_.wants_keyframe(published_->calibration.camera);
+  return options_.automatic && session_.wants_keyframe(publication_.calibration().camera);
 }
 
 void SelfCalibration::add_keyframe(const ImageView& image) {
@@ -331,16 +290,11 @@ void SelfCalibration::add_keyframe(const ImageView& image) {
 }
 
 void SelfCalibration::add(const PanTiltSample& sample) {
-  now_s_ = std::max(now_s_, sample.latest_time_s);
-  last_sample_s_ = sample.latest_time_s;
-  telemetry_is_lost_ = false;
+  streams_.add(sample);
   judge_zoom(sample);
   look_for_stored();
   session_.add(sample);
 }
-
-void SelfCalibration::video_lost() { video_is_lost_ = true; }
-void SelfCalibration::telemetry_lost() { telemetry_is_lost_ = true; }
 
 bool SelfCalibration::ask_for_fresh() {
   if (!options_.automatic) return false;
@@ -357,46 +311,42 @@ bool SelfCalibration::due() const {
 std::shared_ptr<const PublishedCalibration> SelfCalibration::work() {
   if (storing_is_due()) {
     std::string error;
-    last_store_s_ = now_s_;
-    say_once(archive_->save_pending(&error) ? "the calibration is stored now" : error);
+    last_store_s_ = streams_.now_s();
+    messages_.say_once(archive_->save_pending(&error) ? "the calibration is stored now" : error);
   }
   if (first_node_is_due()) take_first_node();
   if (first_node_is_wanted()) {
     make_first_node();
   } else if (adjusting_is_due()) {
-    last_try_s_ = session_.newest_s();
-    if (is_calibrated_here() && !fresh_wanted_) {
+    pace_.note_try(session_);
+    if (is_calibrated_here() && !publication_.is_fresh_wanted()) {
       hold_against_published();
     } else {
       try_first();
     }
   }
-  return std::exchange(next_, nullptr);
+  return publication_.take_next();
 }
 
 CalibrationReport SelfCalibration::report() const {
   CalibrationReport report;
   if (!options_.automatic) return report;
-  report.activity = is_calibrated_here() ? CalibrationActivity::kWatching
-                    : doubtful_          ? CalibrationActivity::kDoubtful
-                                         : CalibrationActivity::kCollecting;
-  const bool wanders = delay_wanders_ && !video_is_lost_;
-  if (wanders) report.need = CalibrationNeed::kSteadyDelay;
-  const bool old = telemetry_is_old_ && !video_is_lost_ && !telemetry_is_lost_;
-  if (old) report.need = CalibrationNeed::kYoungTelemetry;
-  if (wanders || old || (is_calibrated_here() && !fresh_wanted_)) return report;
-  if (video_is_lost_ || last_frame_s_ < now_s_ - options_.schedule.silence_s) {
-    report.need = CalibrationNeed::kVideo;
-  } else if (telemetry_is_lost_ || last_sample_s_ < now_s_ - options_.schedule.silence_s) {
-    report.need = CalibrationNeed::kTelemetry;
-  } else if (now_s_ < zoom_changed_s_ + options_.schedule.zoom_settles_s) {
+  report.activity = is_calibrated_here()          ? CalibrationActivity::kWatching
+                    : publication_.is_withdrawn() ? CalibrationActivity::kDoubtful
+                                                  : CalibrationActivity::kCollecting;
+  const std::optional<CalibrationNeed> unsteady = streams_.unsteady();
+  const std::optional<CalibrationNeed> missing = streams_.missing();
+  if (unsteady) {
+    report.need = *unsteady;
+  } else if (is_calibrated_here() && !publication_.is_fresh_wanted()) {
+    report.need = CalibrationNeed::kNothing;
+  } else if (missing) {
+    report.need = *missing;
+  } else if (!zoom_.has_settled(streams_.now_s())) {
     report.need = CalibrationNeed::kSteadyZoom;
   } else {
-    report.need = tries_ > 0 ? need_ : CalibrationNeed::kTime;
+    report.need = pace_.has_tried() ? need_ : CalibrationNeed::kTime;
   }
   return report;
 }
-
-std::vector<std::string> SelfCalibration::take_messages() { return std::exchange(messages_, {}); }
-
 }  // namespace alidade

@@ -39,76 +39,60 @@ bool look_alike(const Calibration& a, const Calibration& b) {
 
 }  // namespace
 
-void SelfCalibration::take_zoom(double zoom, double changed_s) {
-  if (zoom_) {
-    zoom_changed_s_ = changed_s;
-    zooms_ = true;
-    nodes_.leave();
-  }
-  zoom_ = zoom;
-  odd_zoom_s_.reset();
-  begin_anew();
-}
-
 // Readings taken for other zooms were this zoom's.
-void SelfCalibration::take_jitter(double zoom) {
-  messages_.push_back(
+void SelfCalibration::take_jitter() {
+  messages_.say(
       fmt::format("the zoom reading jitters by {:.2g} (one standard deviation): what differs by up "
                   "to {:.2g} is taken for one zoom; calibration.zoom_tolerance says otherwise",
-                  steady_zoom_.sigma(), steady_zoom_.tolerance()));
-  if (archive_ != nullptr) archive_->set_zoom_tolerance(steady_zoom_.tolerance());
+                  zoom_.sigma(), zoom_.tolerance()));
+  if (archive_ != nullptr) archive_->set_zoom_tolerance(zoom_.tolerance());
   zooms_ = options_.zooms || !nodes_.empty();
-  odd_zoom_s_.reset();
-  zoom_ = zoom;
 }
 
 void SelfCalibration::judge_zoom(const PanTiltSample& sample) {
-  const double time_s = sample.latest_time_s;
+  using Change = PresentZoom::Change;
   if (sample.zoom && !std::isfinite(*sample.zoom)) {
-    say_once("the pan/tilt source tells a zoom reading that is no number; such are left out");
+    messages_.say_once(
+        "the pan/tilt source tells a zoom reading that is no number; such are left out");
   }
-  if (!sample.zoom || !std::isfinite(*sample.zoom)) {
-    if (zoom_ && time_s > last_zoom_s_ + options_.schedule.zoom_silence_s) {
-      say_once(fmt::format(
+  const Change change = zoom_.add(sample);
+  switch (change) {
+    case Change::kNone:
+      return;
+    case Change::kSilent:
+      messages_.say_once(fmt::format(
           "no zoom reading for {:g} s; the last, {}, is taken to hold: does the pan/tilt link tell "
           "the zoom in every answer?",
-          options_.schedule.zoom_silence_s, *zoom_));
-    }
-    return;
-  }
-  last_zoom_s_ = time_s;
-  const double zoom = steady_zoom_.add(time_s, *sample.zoom);
-  if (steady_zoom_.found_now()) {
-    take_jitter(zoom);
-    return;
-  }
-  if (zoom_ && std::abs(zoom - *zoom_) <= steady_zoom_.tolerance()) {
-    if (odd_zoom_s_) {
-      say_once(fmt::format(
+          options_.schedule.zoom_silence_s, *zoom_.reading()));
+      return;
+    case Change::kJitter:
+      take_jitter();
+      return;
+    case Change::kGlitch:
+      messages_.say_once(fmt::format(
           "the zoom reading left {} and was back within {:g} s, as no lens can: taken for a glitch",
-          *zoom_, options_.schedule.zoom_glitch_s));
-    }
-    odd_zoom_s_.reset();
-    // The first reading is not yet the level of the rest.
-    if (steady_zoom_.rest() && !is_calibrated_here()) zoom_ = zoom;
-    return;
+          *zoom_.reading(), options_.schedule.zoom_glitch_s));
+      [[fallthrough]];
+    case Change::kSame:
+      if (!is_calibrated_here()) zoom_.take_level();
+      return;
+    case Change::kMoved:
+      zooms_ = true;
+      nodes_.leave();
+      [[fallthrough]];
+    case Change::kFirst:
+      begin_anew();
   }
-  const bool stood = zoom_ && time_s > zoom_changed_s_ + options_.schedule.zoom_settles_s;
-  if (stood && !odd_zoom_s_) odd_zoom_s_ = time_s;
-  if (odd_zoom_s_ && time_s < *odd_zoom_s_ + options_.schedule.zoom_glitch_s) return;
-  // A movement lasts at least until its last reading.
-  take_zoom(zoom, time_s);
 }
 
 // At a new zoom: was the camera there before, or is it on the curve?
 void SelfCalibration::look_for_stored() {
-  if (!zoom_ || is_calibrated_here() || now_s_ < zoom_changed_s_ + options_.schedule.zoom_arrives_s)
-    return;
-  const StoredCalibration* stored = archive_ == nullptr ? nullptr : archive_->find(zoom_);
+  if (!zoom_.reading() || is_calibrated_here() || !zoom_.has_arrived(streams_.now_s())) return;
+  const StoredCalibration* stored = archive_ == nullptr ? nullptr : archive_->find(zoom_.reading());
   // A calibration without a zoom, which holds for any, would have fitted already.
   if (stored != nullptr && !stored->calibration.zoom) stored = nullptr;
   auto found = std::make_shared<PublishedCalibration>();
-  const bool on_curve = nodes_.curve().at(*zoom_, &found->calibration) &&
+  const bool on_curve = nodes_.curve().at(*zoom_.reading(), &found->calibration) &&
                         (stored == nullptr || has_free_centre(stored->calibration));
   const double f_sigma = relative_focal_length_sigma(found->calibration);
   const bool by_curve = on_curve && f_sigma <= kSharpFocalLength;
@@ -116,11 +100,11 @@ void SelfCalibration::look_for_stored() {
     // The real-time thread has the curve. It follows points, or begins a map where nothing better
     // will come.
     if (options_.automatic)
-      say_once(
+      messages_.say_once(
           fmt::format("zoom {}: by the zoom curve the focal length is known to {:.2g} %: PT mode "
                       "with that sigma "
                       "until it is calibrated here",
-                      *zoom_, 100 * f_sigma));
+                      *zoom_.reading(), 100 * f_sigma));
     return;
   }
   if (stored != nullptr && (!by_curve || look_alike(stored->calibration, found->calibration)))
@@ -133,26 +117,22 @@ void SelfCalibration::look_for_stored() {
   } else {
     return;
   }
-  if (is_rejected(found->calibration)) return;
+  if (publication_.is_rejected(*found->calibration.zoom)) return;
   found->calibrated = true;
   found->zoom_curve = nodes_.curve();
   // For a stored one the connection is unknown.
   found->of_this_connection = by_curve && nodes_.clock_is_known();
-  messages_.push_back(fmt::format("zoom {}: the calibration {} holds", *zoom_, found->name));
-  published_ = next_ = found;
-  fresh_wanted_ = false;
-  doubtful_ = false;
+  messages_.say(fmt::format("zoom {}: the calibration {} holds", *zoom_.reading(), found->name));
+  publication_.replace(found, found->of_this_connection);
   if (!makes_nodes()) contradiction_.restart();
-  clock_offset_known_ = found->of_this_connection;
-  watch_interval_s_ =
-      makes_nodes() ? options_.schedule.next_try_s : options_.schedule.first_watch_s;
+  pace_.watch_after(makes_nodes() ? options_.schedule.next_try_s : options_.schedule.first_watch_s);
   need_ = CalibrationNeed::kNothing;
 }
 
 // In a work() of its own, so that publishing does not wait for it.
 void SelfCalibration::make_first_node() {
   first_node_is_wanted_ = false;
-  if (!zoom_) return;
+  if (!zoom_.reading()) return;
   const CheckedCalibration made = adjust(nullptr, true);
   if (made.result.status == CalibrationStatus::kCancelled) return;
   FirstNode node;
@@ -172,7 +152,7 @@ void SelfCalibration::take_first_node() {
   if (!nodes_.empty() || !makes_nodes()) return;
   const Calibration& calibration = first.result.calibration;
   if (!first.refusal.empty()) {
-    messages_.push_back(fmt::format(
+    messages_.say(fmt::format(
         "zoom {}: no node of the zoom curve until the camera is there again: with a free optical "
         "centre, {}",
         *calibration.zoom, first.refusal));
@@ -210,32 +190,32 @@ void SelfCalibration::refine_node(CheckedCalibration alone) {
     return;
   }
   contradiction_.restart();
-  if (!nodes_.has_visit() || !clock_offset_known_ ||
-      is_sharper(addition.calibration, published_->calibration,
+  if (!nodes_.has_visit() || !publication_.clock_holds() ||
+      is_sharper(addition.calibration, publication_.calibration(),
                  options_.schedule.worth_publishing)) {
     take_node(addition, &alone);
   }
 }
 
 void SelfCalibration::take_node(const ZoomAddition& addition, CheckedCalibration* checked) {
-  if (!nodes_.has_visit()) watch_interval_s_ = options_.schedule.first_watch_s;
+  if (!nodes_.has_visit()) pace_.watch_soon();
   nodes_.take(addition);
   contradiction_.restart();
   checked->result.calibration = addition.calibration;
   publish(*checked);
   if (!addition.node) return;
   const ZoomCurve& curve = nodes_.curve();
-  messages_.push_back(fmt::format("zoom curve: {} nodes from reading {} to {}", curve.visits(),
-                                  curve.first_reading(), curve.last_reading()));
+  messages_.say(fmt::format("zoom curve: {} nodes from reading {} to {}", curve.visits(),
+                            curve.first_reading(), curve.last_reading()));
   // Its data is in the node now.
   session_.clear();
 }
 
 // Perhaps this reading alone is wrong: the other nodes are kept until a second one contradicts.
 void SelfCalibration::contradict_nodes(const CheckedCalibration& alone, const std::string& why) {
-  messages_.push_back(fmt::format("zoom {}: not of the zoom curve: {}", *zoom_, why));
+  messages_.say(fmt::format("zoom {}: not of the zoom curve: {}", *zoom_.reading(), why));
   const auto verdict = contradiction_.judge(std::numeric_limits<double>::infinity());
-  if (fresh_wanted_ || verdict == ContradictionJudge::Verdict::kBelieved) {
+  if (publication_.is_fresh_wanted() || verdict == ContradictionJudge::Verdict::kBelieved) {
     contradiction_.restart();
     begin_nodes_anew(alone);
   } else {
@@ -245,13 +225,13 @@ void SelfCalibration::contradict_nodes(const CheckedCalibration& alone, const st
 
 void SelfCalibration::begin_nodes_anew(const CheckedCalibration& alone) {
   const std::string aside = archive_ == nullptr ? "" : archive_->set_zooms_aside();
-  messages_.push_back(
+  messages_.say(
       fmt::format("another camera or lens than the zoom curve's, or moved on its mount, or its "
                   "reading does not "
                   "follow the lens: a new curve begins at zoom {}{}{}",
-                  *zoom_, aside.empty() ? "" : "; ", aside));
+                  *zoom_.reading(), aside.empty() ? "" : "; ", aside));
   nodes_.begin_anew(alone.result.calibration);
-  rejected_.clear();
+  publication_.accept([](double) { return true; });
   publish(alone);
 }
 

@@ -5,13 +5,14 @@ LIST = "edge_app/tracking/target_list_fields.yaml"
 BY = by(LIST)
 KEYS = {"name", "type", "unit", "null_if", "enum", "says", "more", "value", "ros"}
 TYPES = {"number", "integer", "word", "targets"}
+UNITS = ("s",)
 READ = {"number": "number", "integer": "integer", "word": "word"}
 HEADER = "std_msgs/Header"
 
 
 def fields_of_list():
     fields = []
-    for field, where in entries(LIST, KEYS, ("name", "type", "says", "value", "ros"), TYPES):
+    for field, where in entries(LIST, KEYS, ("name", "type", "says", "value", "ros"), TYPES, UNITS):
         if field["type"] == "targets" and "null_if" in field:
             raise ListError(f"{where}: targets cannot be null")
         if "as" not in field["ros"] and field["type"] not in READ:

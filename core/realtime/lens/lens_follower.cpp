@@ -138,8 +138,8 @@ ZoomPrior LensFollower::prior(const Camera<double>& camera, double zoom_rate) co
   return out;
 }
 
-LearntLens LensFollower::learn(double time_s, const SolvedZoom& zoom, double focal_length,
-                               double zoom_rate, const LensScale& scale) {
+OwnLens LensFollower::learn(double time_s, const SolvedZoom& zoom, double focal_length,
+                            double zoom_rate, const LensScale& scale) {
   const LensTrack::State state{
       {std::log(focal_length), zoom_rate}, zoom.covariance, zoom.sensitivity};
   frames_lost_ = 0;
@@ -149,10 +149,10 @@ LearntLens LensFollower::learn(double time_s, const SolvedZoom& zoom, double foc
       std::abs(zoom_rate) < options_.resting_sigmas * std::sqrt(zoom.covariance(1, 1));
   frames_at_rest_ = rests ? std::min(frames_at_rest_ + 1, options_.frames_at_rest) : 0;
   note_unknown();
-  LearntLens out;
-  out.lens.used = true;
-  out.lens.covariance = zoom.covariance;
-  out.lens.sensitivity = zoom.sensitivity;
+  OwnLens out;
+  out.used = true;
+  out.covariance = zoom.covariance;
+  out.sensitivity = zoom.sensitivity;
   if (!reading_) return out;
   const double told = std::log(reading_->calibration.camera.focal_length);
   out.reading_sigmas =

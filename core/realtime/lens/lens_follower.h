@@ -42,13 +42,6 @@ struct LensFollowerOptions {
   [[nodiscard]] bool validate(const char** error = nullptr) const;
 };
 
-// A frame's lens, learnt from landmarks.
-struct LearntLens {
-  OwnLens lens;
-  // |log f minus the reading's|, in standard deviations of both; 0 without a reading.
-  double reading_sigmas = 0;
-};
-
 class LensFollower {
  public:
   // options: valid.
@@ -111,9 +104,10 @@ class LensFollower {
   // Prior for a solution about this camera and rate (1/s).
   [[nodiscard]] ZoomPrior prior(const Camera<double>& camera, double zoom_rate) const;
 
-  // zoom, zoom_rate: as solved. focal_length: px, with the correction, at phi = 0.
-  [[nodiscard]] LearntLens learn(double time_s, const SolvedZoom& zoom, double focal_length,
-                                 double zoom_rate, const LensScale& scale);
+  // zoom, zoom_rate: as solved. focal_length: px, with the correction, at phi = 0. The result's zoom
+  // is the caller's to set.
+  [[nodiscard]] OwnLens learn(double time_s, const SolvedZoom& zoom, double focal_length,
+                              double zoom_rate, const LensScale& scale);
   void note_lost() { frames_lost_ += columns_ ? 1 : 0; }
   // True if neither the curve nor the previous frames lead to the lens.
   [[nodiscard]] bool is_lost_for_good() const {

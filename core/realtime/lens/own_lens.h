@@ -35,13 +35,15 @@ struct SolvedZoom {
   Matrix2<double> innovation_by_calibration = Matrix2<double>::Zero();
 };
 
-// The frame's lens if it is not the map's (lens_track.h): covariance of log f (1) and its rate
-// (1/s), without the map's scale.
+// The frame's lens if it is not the map's, after its landmarks (lens_track.h): covariance of log f
+// (1) and its rate (1/s), without the map's scale.
 struct OwnLens {
   bool used = false;
   Matrix2<double> covariance = Matrix2<double>::Zero();
   Sensitivity<2> sensitivity = Sensitivity<2>::Zero();
   int zoom = 0;  // of the map's cells, see LandmarkMap
+  // |log f minus the reading's|, in standard deviations of both; 0 without a reading.
+  double reading_sigmas = 0;
 
   // Variance of log f t seconds after the middle row.
   [[nodiscard]] double variance(double t) const {

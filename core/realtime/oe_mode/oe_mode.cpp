@@ -18,39 +18,27 @@ double rate_sigma(const SolvedMotion& solved) {
 
 OeMode::OeMode(const OeOptions& options)
     : options_(options),
-      pyramid_(options.max_width, options.max_height, Pyramid::kMaxOctaves),
-      octaves_(options.octaves),
-      noise_(options.noise),
-      map_(options.max_landmarks, LandmarkMap::kMaxCellSize),
+      calibration_(options.lens),
+      image_(options),
+      map_(options),
       prediction_(options.prediction),
-      search_(options.search, map_.capacity()),
+      search_(options.search, map_.landmarks().capacity()),
       offset_(options.offset),
-      tie_(options.tie),
-      lens_(options.lens),
-      shear_(options.shear),
-      upkeep_(options.upkeep),
-      maker_(options.maker, options.octaves, options.max_width, options.max_height),
-      in_view_(map_.capacity()) {}
+      tie_(options.tie) {}
 
 std::size_t OeMode::memory_bytes() const {
-  return sizeof(*this) - sizeof(map_) + map_.memory_bytes() + pyramid_.memory_bytes() +
-         noise_.memory_bytes() + search_.memory_bytes() + maker_.memory_bytes() +
-         in_view_.memory_bytes();
+  return sizeof(*this) + image_.memory_bytes() + map_.memory_bytes() + search_.memory_bytes();
 }
 
 void OeMode::reset(const Calibration& calibration, FocalLength focal_length) {
-  lens_.begin(calibration.camera.focal_length);
-  given_ = calibration;
-  begun_elsewhere_ = false;
-  focal_length_ = focal_length;
-  calibration_ = calibration;
+  calibration_.reset(calibration, focal_length);
   const Camera<double>& camera = calibration.camera;
   ready_ = camera.width > 0 && camera.height > 0 && camera.width <= options_.max_width &&
            camera.height <= options_.max_height && camera.focal_length > 0;
   if (!ready_) return;
-  octaves_.reset(camera.height);
+  image_.reset(camera.height);
   search_.reset(calibration);
-  in_view_.reset(calibration, search_.options().cone_margin);
+  map_.reset(calibration);
   forget_map();
   frames_ = 0;
 }
@@ -66,23 +54,24 @@ OeStatus OeMode::process(const ImageView& image, double frame_time_s,
     return finish(OeStatus::kNoPrediction);
   }
   if (telemetry != nullptr &&
-      (!pt_orientation(answers_calibration(), frame_time_s, *telemetry, out) ||
+      (!pt_orientation(calibration_.of_answer(), frame_time_s, *telemetry, out) ||
        !tie_telemetry(out))) {
     return finish(OeStatus::kNotFinite);
   }
   if (!has_lens) return finish(OeStatus::kLensMoves);
-  if (!build_pyramid(image)) {
+  if (!image_.build(image, camera())) {
     return finish(telemetry != nullptr ? OeStatus::kBadImage : OeStatus::kNoPrediction);
   }
 
   // 1. Prediction.
   PredictedMotion predicted =
-      telemetry != nullptr ? prediction_.by_telemetry(calibration_, *telemetry, offset_.offset(),
-                                                      offset_.inflation(*telemetry, frame_time_s))
-                           : prediction_.by_last_frame(frame_time_s);
-  predicted.motion.zoom_rate = lens_.columns() != nullptr ? lens_.expected().value[1] : 0;
-  const double sigma_px = calibration_.camera.focal_length *
-                          std::sqrt(predicted.angle_covariance.diagonal().maxCoeff());
+      telemetry != nullptr
+          ? prediction_.by_telemetry(calibration_.of_frame(), *telemetry, offset_.offset(),
+                                     offset_.inflation(*telemetry, frame_time_s))
+          : prediction_.by_last_frame(frame_time_s);
+  predicted.motion.zoom_rate = own_lens() != nullptr ? calibration_.lens().expected().value[1] : 0;
+  const double sigma_px =
+      camera().focal_length * std::sqrt(predicted.angle_covariance.diagonal().maxCoeff());
   offset_.drift(prediction_.since_last_s(frame_time_s));
   tie_.drift(prediction_.since_last_s(frame_time_s));
 
@@ -120,12 +109,6 @@ void OeMode::begin_frame(const ImageView& image, double frame_time_s,
   frame_.look_up_sigma_s = telemetry->time_sigma_s;
 }
 
-bool OeMode::build_pyramid(const ImageView& image) {
-  return image.valid() && image.width == calibration_.camera.width &&
-         image.height == calibration_.camera.height &&
-         pyramid_.build(image, octaves_.count()) == PyramidStatus::kOk;
-}
-
 OeMode::Solution OeMode::solve_about(const FrameMotion<double>& motion,
                                      const PredictedMotion& predicted) {
   const LandmarkSearch::Fine fine = search_.align_fine(searched(), motion);
@@ -139,8 +122,8 @@ OeMode::Solution OeMode::solve_about(const FrameMotion<double>& motion,
     prior.scale_inflation = offset_.scale_inflation(frame_.time_s);
   }
   ZoomPrior zoom;
-  if (lens_.columns() != nullptr) {
-    zoom = lens_.prior(calibration_.camera, motion.zoom_rate);
+  if (own_lens() != nullptr) {
+    zoom = calibration_.prior(motion.zoom_rate);
     prior.zoom = &zoom;
   }
   prior.motion.tail<2>() = predicted.motion.acceleration.vector() - motion.acceleration.vector();
@@ -154,11 +137,11 @@ OeMode::Solution OeMode::solve_about(const FrameMotion<double>& motion,
   }
   Solution out;
   out.motion = motion;
-  const Camera<double>& camera = calibration_.camera;
-  out.camera = camera;
+  const Calibration& calibration = calibration_.of_frame();
+  out.camera = calibration.camera;
   out.status = solve_orientation(search_.found().data(), fine.found, prior, options_.solve,
-                                 camera.width, camera.height,
-                                 calibration_.line_delay * (0.5 * camera.height), &out.solved);
+                                 out.camera.width, out.camera.height,
+                                 calibration.line_delay * (0.5 * out.camera.height), &out.solved);
   return out;
 }
 
@@ -166,19 +149,19 @@ OeMode::Solution OeMode::find_and_solve(const PredictedMotion& predicted,
                                         const LandmarkSearch::Coarse& coarse, double sigma_px) {
   const LookOptions& look = options_.look;
   Solution first;
-  first.camera = calibration_.camera;
+  first.camera = camera();
   if (coarse.aligned || sigma_px < look.nearby_px) {
-    first = lens_.columns() != nullptr ? look_with_own_lens(coarse.motion, predicted)
-                                       : solve_about(coarse.motion, predicted);
+    first = own_lens() != nullptr ? look_with_own_lens(coarse.motion, predicted)
+                                  : solve_about(coarse.motion, predicted);
   }
   const bool doubtful = first.status == SolveStatus::kTooFew ||
                         (first.status == SolveStatus::kOk &&
                          first.solved.inliers < look.least_held * statistics_.chosen);
   // A lens that moves unnoticed shows in the residuals first.
-  const bool misfit = lens_is_learnt() && !lens_.moves() && first.status == SolveStatus::kOk &&
-                      first.solved.inflation > look.misfit;
+  const bool misfit = lens_is_learnt() && !calibration_.lens().moves() &&
+                      first.status == SolveStatus::kOk && first.solved.inflation > look.misfit;
   if (!doubtful && !misfit) return first;
-  if (lens_is_learnt() && map_.size() > 0) return look_for_moved_lens(first, coarse, predicted);
+  if (lens_is_learnt() && !map_.empty()) return look_for_moved_lens(first, coarse, predicted);
   if (!prediction_.follows(frame_.time_s)) return first;
   // A second look, where the previous motion leads.
   const OeStatistics first_look = statistics_;
@@ -201,25 +184,27 @@ OeStatus OeMode::answer_without_landmarks(const PredictedMotion& predicted,
   const bool has_telemetry = frame_.telemetry != FrameTelemetry::kNone;
   const bool contradiction = solution.status == SolveStatus::kContradiction;
   search_.conclude(Vector6::Zero());
-  lens_.note_lost();
+  calibration_.note_lost();
   frame_.motion = predicted.motion;
   frame_.covariance = predicted.covariance;
   frame_.shared_covariance = predicted.offset_covariance;
   frame_.sensitivity = predicted.sensitivity;
   // Where no landmark is expected, telemetry may place new ones.
-  const bool new_view = has_telemetry && !lens_.moves() && statistics_.chosen < options_.look.few &&
+  const bool new_view = has_telemetry && !calibration_.lens().moves() &&
+                        statistics_.chosen < options_.look.few &&
                         static_cast<int>(search_.coarse().size()) < options_.look.few_coarse;
   frame_.use = new_view ? MapUse::kNewView : MapUse::kLost;
-  upkeep_.note_lost(contradiction,
-                    solution.status == SolveStatus::kTooFew && has_telemetry && !new_view);
+  map_.note_lost(contradiction,
+                 solution.status == SolveStatus::kTooFew && has_telemetry && !new_view);
   if (!has_telemetry) return finish(OeStatus::kNoPrediction);
   if (!contradiction) return finish(OeStatus::kTooFew);
   // One of the two is wrong, and it is unknown which: the answer must cover both.
   MotionCovariance covering = out->motion_covariance;
   covering.topLeftCorner<2, 2>() +=
       solution.solved.innovation * solution.solved.innovation.transpose();
-  return finish(make_frame_orientation(answers_calibration(), frame_.time_s, OrientationMode::kPt,
-                                       0, out->motion(), covering, out->motion_sensitivity, out)
+  return finish(make_frame_orientation(calibration_.of_answer(), frame_.time_s,
+                                       OrientationMode::kPt, 0, out->motion(), covering,
+                                       out->motion_sensitivity, out)
                     ? OeStatus::kContradiction
                     : OeStatus::kNotFinite);
 }
@@ -230,11 +215,11 @@ OeStatus OeMode::answer_with_landmarks(const PredictedMotion& predicted, const S
   const bool enclosed = frame_.telemetry == FrameTelemetry::kEnclosed;
   FrameMotion<double> motion = solution.motion;
   add(solved.correction, &motion);
-  if (lens_.columns() != nullptr) motion.zoom_rate += solved.zoom.correction[1];
-  shear_.move_to(motion.angle.tilt);
+  if (own_lens() != nullptr) motion.zoom_rate += solved.zoom.correction[1];
+  map_.look_at(motion.angle.tilt);
   if (frame_.telemetry == FrameTelemetry::kExtrapolated) {
     add_pending(motion.angle.vector(),
-                solved.frame_covariance.topLeftCorner<2, 2>() + shear_.angle_covariance(),
+                solved.frame_covariance.topLeftCorner<2, 2>() + map_.shear().angle_covariance(),
                 solved.shared_covariance, solved.zoom.innovation_by_calibration,
                 solved.sensitivity.topRows<2>());
   }
@@ -245,7 +230,7 @@ OeStatus OeMode::answer_with_landmarks(const PredictedMotion& predicted, const S
     return answer_without_landmarks(predicted, contradiction, out);
   }
   search_.conclude(solved.correction, solved.zoom.correction);
-  upkeep_.note_held();
+  map_.note_held();
   offset_.note_agreement();
   frame_.motion = motion;
   frame_.covariance = solved.frame_covariance;
@@ -260,20 +245,21 @@ OeStatus OeMode::answer_with_landmarks(const PredictedMotion& predicted, const S
   Matrix6 covariance = covariance_of_answer(solved, added);
   Sensitivity<6> sensitivity = solved.sensitivity;
   sensitivity.topRows<2>() += added.sensitivity;
-  covariance += sensitivity * lens_.unshared(offset_.lens()).asDiagonal() * sensitivity.transpose();
+  covariance += sensitivity * calibration_.lens().unshared(offset_.lens()).asDiagonal() *
+                sensitivity.transpose();
   if (lens_is_learnt()) {
-    if (lens_.columns() != nullptr) learn_own_lens(solution, motion.zoom_rate);
-    answers_calibration_ =
-        lens_of_answer(solved.lens.value, solved.lens.variance, solved.lens.sensitivity);
+    if (own_lens() != nullptr) learn_own_lens(solution, motion.zoom_rate);
+    calibration_.answer(frame_.lens, offset_.lens(), solved.lens.value, solved.lens.variance,
+                        solved.lens.sensitivity);
     add_lens(solved.lens, &in_base, &sensitivity);
-    if (lens_.columns() != nullptr) lens_.columns()->to_frame(&sensitivity);
+    if (own_lens() != nullptr) own_lens()->to_frame(&sensitivity);
   }
-  if (!make_frame_orientation(answers_calibration(), frame_.time_s, OrientationMode::kOe,
+  if (!make_frame_orientation(calibration_.of_answer(), frame_.time_s, OrientationMode::kOe,
                               solved.inliers, in_base, covariance, sensitivity, out)) {
     return finish(frame_.telemetry != FrameTelemetry::kNone ? OeStatus::kTooFew
                                                             : OeStatus::kNoPrediction);
   }
-  if (lens_.columns() != nullptr) out->zoom_rate_sigma = rate_sigma(solved);
+  if (own_lens() != nullptr) out->zoom_rate_sigma = rate_sigma(solved);
   note_landmarks_answer(solved, added);
   if (enclosed) {
     // A contradiction does not get here: see solve_orientation().
@@ -287,8 +273,7 @@ OeStatus OeMode::answer_with_landmarks(const PredictedMotion& predicted, const S
   if (lens_is_learnt()) {
     offset_.learn_scale(frame_.time_s, solved.lens.measured, solved.lens.information,
                         solved.lens.measured_sensitivity);
-    const LensScale& lens = offset_.lens();
-    answers_calibration_ = lens_of_answer(lens.value, lens.variance, lens.sensitivity);
+    calibration_.answer(frame_.lens, offset_.lens());
   }
   offset_.note_answer(frame_.time_s);
   prediction_.remember(frame_.time_s, motion, solved.frame_covariance, solved.shared_covariance,

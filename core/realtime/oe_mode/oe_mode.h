@@ -15,10 +15,15 @@
 #include "core/realtime/frame_orientation.h"
 #include "core/realtime/image/image_view.h"
 #include "core/realtime/lens/frame_lens.h"
-#include "core/realtime/lens/lens_follower.h"
 #include "core/realtime/oe_mode/base_tie.h"
+#include "core/realtime/oe_mode/calibration_in_use.h"
+#include "core/realtime/oe_mode/image_octaves.h"
 #include "core/realtime/oe_mode/landmark_map.h"
+#include "core/realtime/oe_mode/landmark_search.h"
+#include "core/realtime/oe_mode/maintained_map.h"
+#include "core/realtime/oe_mode/map_offset_filter.h"
 #include "core/realtime/oe_mode/map_state.h"
+#include "core/realtime/oe_mode/motion_prediction.h"
 #include "core/realtime/oe_mode/oe_options.h"
 #include "core/realtime/oe_mode/processed_frame.h"
 #include "core/realtime/telemetry/telemetry_interpolation.h"
@@ -33,11 +38,6 @@ enum class OeStatus {
   kBadImage,       // no image, or not of the calibration's size: telemetry alone
   kLensMoves,      // no map begins with a moving lens, or the lens is unknown: telemetry alone
   kNotFinite       // nothing is written
-};
-
-enum class FocalLength {
-  kCalibrated,  // with the covariance of the calibration
-  kLearnt       // also from the images: the lens has returned from a movement
 };
 
 struct OeStatistics {
@@ -111,9 +111,11 @@ class OeMode {
 
   // True if the map began with another lens than that of the last frame or of reset(), or if the
   // lens moved.
-  [[nodiscard]] bool lens_has_moved() const { return lens_.follows() || begun_elsewhere_; }
+  [[nodiscard]] bool lens_has_moved() const {
+    return calibration_.lens().follows() || calibration_.begun_elsewhere();
+  }
   // True if the map began before that lens moved, and has been kept since.
-  [[nodiscard]] bool has_followed_lens() const { return lens_.follows(); }
+  [[nodiscard]] bool has_followed_lens() const { return calibration_.lens().follows(); }
 
   // Upkeep of the map with the last frame (processed_frame.h), to be called after its answer is
   // out. Does nothing if that frame has no sure orientation.
@@ -152,7 +154,7 @@ class OeMode {
   // statistics().found observations. Residuals and inliers are the solution's or, without one, the
   // prediction's.
   [[nodiscard]] const OeObservation* observations() const { return search_.observations().data(); }
-  [[nodiscard]] const LandmarkMap& map() const { return map_; }
+  [[nodiscard]] const LandmarkMap& map() const { return map_.landmarks(); }
 
   // For another OeMode, or for the next start. Allocates: not for the real-time thread.
   [[nodiscard]] MapState map_state() const;
@@ -168,18 +170,13 @@ class OeMode {
   };
 
   [[nodiscard]] SearchedFrame searched() const {
-    return {calibration_,
-            map_,
-            pyramid_,
-            octaves_,
-            lens_.columns(),
-            lens_.moves(),
-            lens_.expected().value[1]};
+    const LensFollower& lens = calibration_.lens();
+    return {calibration_.of_frame(), map_.landmarks(), image_.pyramid(),        image_.octaves(),
+            lens.columns(),          lens.moves(),     lens.expected().value[1]};
   }
   void begin_frame(const ImageView& image, double frame_time_s,
                    const InterpolatedPanTilt* telemetry);
   OeStatus finish(OeStatus status) { return statistics_.status = status; }
-  [[nodiscard]] bool build_pyramid(const ImageView& image);
   [[nodiscard]] Solution solve_about(const FrameMotion<double>& motion,
                                      const PredictedMotion& predicted);
   [[nodiscard]] Solution find_and_solve(const PredictedMotion& predicted,
@@ -202,11 +199,10 @@ class OeMode {
   [[nodiscard]] bool tie_telemetry(FrameOrientation* out);
 
   [[nodiscard]] bool lens_is_learnt() const { return offset_.lens().learnt; }
-  // Calibration of answers: with the focal length as learnt so far.
-  [[nodiscard]] const Calibration& answers_calibration() const {
-    return lens_is_learnt() ? answers_calibration_ : calibration_;
-  }
-  void begin_lens();
+  // Camera of the frame at phi = 0.
+  [[nodiscard]] const Camera<double>& camera() const { return calibration_.of_frame().camera; }
+  // The lens that a frame is solved with, if it is not the map's.
+  [[nodiscard]] const LensColumns* own_lens() const { return calibration_.lens().columns(); }
   // Takes the lens of this frame. False if it can neither begin a map nor be used to find
   // landmarks.
   [[nodiscard]] bool take_lens(const FrameLens* reading);
@@ -217,43 +213,25 @@ class OeMode {
                                              const LandmarkSearch::Coarse& coarse,
                                              const PredictedMotion& predicted);
   void learn_own_lens(const Solution& solution, double zoom_rate);
-  [[nodiscard]] Calibration lens_of_answer(double phi, double variance,
-                                           const Sensitivity<1>& sensitivity) const;
   void add_lens(const SolvedLens& lens, FrameMotion<double>* in_base,
                 Sensitivity<6>* sensitivity) const;
   void follow_lens();
 
-  void doubt_map();
   void begin_map();
-  void straighten_map();
-  void clear_landmarks();
+  void straighten(const ShearCorrection& correction);
   void forget_map();
 
   OeOptions options_;
-  Calibration given_;  // by reset(), or of a reading: see begun_elsewhere_
-  FocalLength focal_length_ = FocalLength::kCalibrated;
-  Calibration calibration_;          // of the map; as given but for the focal length
-  Calibration answers_calibration_;  // if the focal length is learnt
-  bool begun_elsewhere_ = false;     // given_ is a reading's
-  double moved_phi_ = 0;             // part of phi that is in calibration_
-  bool ready_ = false;               // images of the calibration's size fit
-  std::uint32_t frames_ = 0;         // count
+  CalibrationInUse calibration_;
+  bool ready_ = false;        // images of the calibration's size fit
+  std::uint32_t frames_ = 0;  // count
 
-  Pyramid pyramid_;  // of the last frame used
-  Octaves octaves_;
-  RunningNoise noise_;
-  LandmarkMap map_;
+  ImageOctaves image_;  // of the last frame used
+  MaintainedMap map_;
   MotionPrediction prediction_;
   LandmarkSearch search_;
   MapOffsetFilter offset_;
   BaseTie tie_;
-  LensFollower lens_;
-  MapShear shear_;
-  MapUpkeep upkeep_;
-  LandmarkMaker maker_;
-  VisibleLandmarks in_view_;       // of maintain()
-  double share_of_new_ = 0;        // share of landmarks in view that the last maintain() made
-  double cells_focal_length_ = 1;  // px, of the map's cells
 
   OeStatistics statistics_;
   ProcessedFrame frame_;  // written by process(), used up by maintain()

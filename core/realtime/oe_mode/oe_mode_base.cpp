@@ -14,10 +14,10 @@ TiedOffset OeMode::offset_of_answer(const SolvedMotion& solved) const {
 
 // frame_.motion: this frame's, in the map's frame.
 SharedByView OeMode::shared_by_view(const SolvedMotion& solved) const {
-  const Camera<double>& camera = calibration_.camera;
+  const Camera<double>& seen_by = camera();
   return {solved.shared_covariance,
           frame_.motion.angle.vector(),
-          {camera.width / camera.focal_length, camera.height / camera.focal_length}};
+          {seen_by.width / seen_by.focal_length, seen_by.height / seen_by.focal_length}};
 }
 
 // If the map itself is tied, the uncertainty of its offset against telemetry does not matter.
@@ -26,7 +26,7 @@ Matrix6 OeMode::covariance_of_answer(const SolvedMotion& solved, const TiedOffse
   Matrix6 covariance = by_map ? solved.frame_covariance : solved.covariance;
   covariance.topLeftCorner<2, 2>() +=
       by_map ? tie_.covariance_in(shared_by_view(solved)) : added.covariance;
-  shear_.add_to(&covariance);
+  map_.shear().add_to(&covariance);
   return covariance;
 }
 
@@ -34,9 +34,9 @@ void OeMode::note_landmarks_answer(const SolvedMotion& solved, const TiedOffset&
   Vector2<double> value = added.value;
   if (lens_is_learnt() && !tie_.is_by_map())
     value += solved.lens.value * solved.lens.offset_by_lens;
-  tie_.note_landmarks(value,
-                      solved.frame_covariance.topLeftCorner<2, 2>() + shear_.angle_covariance(),
-                      shared_by_view(solved), solved.sensitivity.topRows<2>());
+  tie_.note_landmarks(
+      value, solved.frame_covariance.topLeftCorner<2, 2>() + map_.shear().angle_covariance(),
+      shared_by_view(solved), solved.sensitivity.topRows<2>());
 }
 
 bool OeMode::tie_telemetry(FrameOrientation* out) {

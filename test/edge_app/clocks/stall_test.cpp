@@ -21,7 +21,7 @@ namespace {
 constexpr double kPeriod_s = 0.04;
 constexpr double kLength_s = 80;
 constexpr double kTimeout_s = 3;  // of the sources: a longer silence is a loss
-constexpr double kPoll_s = 1.0 / 30;
+constexpr double kPollPeriod_s = 1.0 / 30;
 constexpr int kSeeds = 20;
 
 class Random {
@@ -308,7 +308,7 @@ std::vector<Polled> play_telemetry(const Scenario& scenario, const std::vector<S
     polled.sample.restarted = restarted;
     restarted = false;
     samples.push_back(polled);
-    sent_s = std::max(sent_s + kPoll_s, answered_s);
+    sent_s = std::max(sent_s + kPollPeriod_s, answered_s);
   }
   return samples;
 }

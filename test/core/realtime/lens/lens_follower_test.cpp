@@ -62,7 +62,7 @@ class FollowedLens : public testing::Test {
     follower_.look_through(scale_, camera_);
   }
   // Landmarks saw this l (log f, its rate), and this well.
-  LearntLens learn(double time_s, const Vector2<double>& l) {
+  OwnLens learn(double time_s, const Vector2<double>& l) {
     const ZoomPrior prior = follower_.prior(camera_, 0);
     Matrix2<double> noise = Matrix2<double>::Zero();
     noise.diagonal() << kSeen * kSeen, kRateSeen * kRateSeen;
@@ -133,10 +133,10 @@ TEST_F(FollowedLens, ErrsAsItsAnswerSays) {
       const FrameLens reading =
           told(std::exp(truth[0] + phi + kRepeatability * normal(random)), k <= kMoving, rate);
       expect(k * kFrame_s, &reading, !follower_.at_rest());
-      const LearntLens learnt =
+      const OwnLens learnt =
           learn(k * kFrame_s,
                 truth + Vector2<double>(kSeen * normal(random), kRateSeen * normal(random)));
-      const Calibration found = answer(learnt.lens);
+      const Calibration found = answer(learnt);
       const double error = std::log(found.camera.focal_length) - (truth[0] + phi);
       squares += error * error / log_variance(found) / (kRuns * kFrames);
       // As exact as the map's scale, not as the reading.
@@ -269,7 +269,7 @@ TEST_F(FollowedLens, StandsAfterThreeFramesWithoutARate) {
 TEST_F(FollowedLens, DoubtsDistortionAndCentreWithoutAReading) {
   follow();
   Vector2<double> truth(std::log(kMapFocalLength), 0);
-  LearntLens learnt;
+  OwnLens learnt;
   for (int k = 1; k <= 40; ++k) {
     const double rate = 0.04 * std::min(k, 40 - k);
     truth[0] += kFrame_s * (truth[1] + rate) / 2;
@@ -279,10 +279,10 @@ TEST_F(FollowedLens, DoubtsDistortionAndCentreWithoutAReading) {
   }
   const double far = truth[0] - std::log(kMapFocalLength);
   ASSERT_NEAR(far, 0.64, 1e-9);
-  const Calibration blind = answer(learnt.lens);
+  const Calibration blind = answer(learnt);
   const FrameLens reading = told(camera_.focal_length);
   follower_.begin_frame(&reading);
-  const Calibration read = answer(learnt.lens);
+  const Calibration read = answer(learnt);
   const auto more = [&](Parameter p) {
     return std::sqrt(blind.covariance(index(p), index(p)) - read.covariance(index(p), index(p)));
   };
@@ -300,7 +300,7 @@ TEST_F(FollowedLens, DoubtsDistortionAndCentreWithoutAReading) {
   follower_.begin(camera_.focal_length);
   follower_.begin_frame(nullptr);
   follower_.look_through(scale_, camera_);
-  const Calibration anew = answer(learnt.lens);
+  const Calibration anew = answer(learnt);
   EXPECT_NEAR(anew.covariance(index(Parameter::kCentreU), index(Parameter::kCentreU)),
               read.covariance(index(Parameter::kCentreU), index(Parameter::kCentreU)), 1e-12);
   EXPECT_NEAR(log_variance(anew), log_variance(read), 1e-15);
@@ -330,7 +330,7 @@ TEST_F(FollowedLens, DoubtsDistortionAndCentreAsTheCurveDidWhereLandmarksWereMad
     static_cast<void>(learn(kFrame_s, l));
     reading.calibration.covariance = of_curve;
     expect(2 * kFrame_s, &reading);
-    OwnLens own = learn(2 * kFrame_s, l).lens;
+    OwnLens own = learn(2 * kFrame_s, l);
     own.sensitivity(0, index(Parameter::kCentreU)) = kByCentre;
     return answer(own);
   };

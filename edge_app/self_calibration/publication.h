@@ -1,0 +1,71 @@
+#pragma once
+// Publication: the calibration that the real-time thread has, or gets next, and what is known of
+// it: whether its clock offset holds, whether it was withdrawn, whether another one is wanted.
+// Allocates. One thread.
+
+#include <algorithm>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "edge_app/record/published_calibration.h"
+
+namespace alidade {
+
+class Publication {
+ public:
+  using Object = std::shared_ptr<const PublishedCalibration>;
+
+  // What the real-time thread begins with. clock_holds: see clock_holds().
+  void begin_with(Object first, bool clock_holds) {
+    present_ = std::move(first);
+    clock_holds_ = clock_holds;
+  }
+  // A calibration takes the place of the present one.
+  void replace(Object by, bool clock_holds) {
+    present_ = next_ = std::move(by);
+    clock_holds_ = clock_holds;
+    is_withdrawn_ = false;
+    is_fresh_wanted_ = false;
+  }
+  // The present one is no longer believed. by: what is left of it. The stored one of its zoom is
+  // rejected.
+  void withdraw(Object by) {
+    if (present_->calibration.zoom) rejected_.push_back(*present_->calibration.zoom);
+    present_ = next_ = std::move(by);
+    is_withdrawn_ = true;
+  }
+  // What is to be published; null: nothing. Once.
+  [[nodiscard]] Object take_next() { return std::exchange(next_, nullptr); }
+
+  [[nodiscard]] const Object& object() const { return present_; }
+  [[nodiscard]] const Calibration& calibration() const { return present_->calibration; }
+  [[nodiscard]] bool is_withdrawn() const { return is_withdrawn_; }
+
+  // True if the frames' clock has run on since the calibration was made.
+  [[nodiscard]] bool clock_holds() const { return clock_holds_; }
+  void clock_began_anew() { clock_holds_ = false; }
+
+  // Whether a calibration shall replace the present one as soon as it can be made.
+  [[nodiscard]] bool is_fresh_wanted() const { return is_fresh_wanted_; }
+  void want_fresh(bool wanted) { is_fresh_wanted_ = wanted; }
+
+  [[nodiscard]] bool is_rejected(double zoom) const {
+    return std::find(rejected_.begin(), rejected_.end(), zoom) != rejected_.end();
+  }
+  // Calibrations of zooms that `fits` says are no longer rejected.
+  template <class Fits>
+  void accept(const Fits& fits) {
+    rejected_.erase(std::remove_if(rejected_.begin(), rejected_.end(), fits), rejected_.end());
+  }
+
+ private:
+  Object present_;
+  Object next_;
+  bool clock_holds_ = true;
+  bool is_withdrawn_ = false;
+  bool is_fresh_wanted_ = false;
+  std::vector<double> rejected_;  // zooms whose stored calibrations were withdrawn
+};
+
+}  // namespace alidade

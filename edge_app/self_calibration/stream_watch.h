@@ -1,0 +1,52 @@
+#pragma once
+// StreamWatch: whether frames and telemetry are such that a camera can be calibrated with them:
+// neither lost nor silent, the video's delay steady, the telemetry young enough for the frames.
+// Seconds of the host's clock. Allocates little. One thread.
+
+#include <optional>
+
+#include "edge_app/record/published_calibration.h"
+#include "edge_app/self_calibration/calibration_schedule.h"
+#include "edge_app/self_calibration/calibration_watch.h"
+#include "edge_app/step/calibration_feed.h"
+#include "platform/pan_tilt/pan_tilt_source.h"
+
+namespace alidade {
+
+class StreamWatch {
+ public:
+  explicit StreamWatch(const CalibrationSchedule& schedule) : schedule_(schedule) {}
+
+  void add(const FrameTracks& tracks);
+  void add(const PanTiltSample& sample);
+  void lose_video() { video_is_lost_ = true; }          // until the next frame
+  void lose_telemetry() { telemetry_is_lost_ = true; }  // until the next sample
+
+  // Judges the delay by this frame. True if it has begun or ceased to wander.
+  [[nodiscard]] bool judge_delay(const FrameTracks& tracks);
+  [[nodiscard]] bool delay_wanders() const { return delay_wanders_; }
+
+  // The latest receive time of either stream.
+  [[nodiscard]] double now_s() const { return now_s_; }
+  // What must become better before anything is calibrated or withdrawn.
+  [[nodiscard]] std::optional<CalibrationNeed> unsteady() const;
+  // The stream that does not come.
+  [[nodiscard]] std::optional<CalibrationNeed> missing() const;
+
+ private:
+  // Half of the frames of 2 s, as docs/records.md says of `needs`.
+  static constexpr DisagreementOptions kOldTelemetry = {/*span_s=*/2, /*share=*/0.5,
+                                                        /*least_frames=*/5};
+
+  CalibrationSchedule schedule_;
+  double now_s_ = 0;
+  double last_frame_s_ = 0;
+  double last_sample_s_ = 0;
+  bool video_is_lost_ = false;
+  bool telemetry_is_lost_ = false;
+  bool delay_wanders_ = false;
+  DisagreementJudge old_telemetry_{kOldTelemetry};
+  bool telemetry_is_old_ = false;
+};
+
+}  // namespace alidade
