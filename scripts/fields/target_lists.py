@@ -1,11 +1,11 @@
 """The object that has a frame's targets: what JSON writes, the OpenAPI schema, the table, the ROS message and how the ROS node reads it."""
 from fields.common import JSON, ListError, between, by, clang_formatted, description, entries, flow, ros_lines
+from fields.targets import UNITS
 
 LIST = "edge_app/tracking/target_list_fields.yaml"
 BY = by(LIST)
 KEYS = {"name", "type", "unit", "null_if", "enum", "says", "more", "value", "ros"}
 TYPES = {"number", "integer", "word", "targets"}
-UNITS = ("s",)
 READ = {"number": "number", "integer": "integer", "word": "word"}
 HEADER = "std_msgs/Header"
 
