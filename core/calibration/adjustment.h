@@ -66,7 +66,7 @@ class Adjustment {
   [[nodiscard]] bool covariance_iteratively(const Linearisation& linearisation,
                                             GlobalMatrix* covariance, double* telemetry_unknowns);
   [[nodiscard]] bool reduce(const Linearisation& linearisation, double damping);
-  // Frees megabytes, which what follows a minimisation or the covariance needs itself.
+  // Frees megabytes, which the steps after a minimisation or the covariance need.
   void forget_reduced() { reduced_.resize(0, 0); }
   // minimise() without freeing memory.
   [[nodiscard]] bool descend(const LossScales& loss, int max_steps, double tolerance,
@@ -76,7 +76,8 @@ class Adjustment {
   std::array<bool, kGlobalCount> fixed_;
   Eigen::Index largest_direct_;
   int steps_taken_ = 0;
-  // The last damping that worked is kept: a few steps at a time then get as far as many at once.
+  // The last damping that worked is kept, so several calls of a few steps get as far as one call of
+  // many.
   double damping_ = 1e-8;
 
   Eigen::MatrixXd reduced_;

@@ -2,11 +2,11 @@
 // calibrate_knowing(): calibrate() with values known from elsewhere, such as a bench
 // (core/pattern).
 // Line delay and aspect belong to the sensor and hold at any zoom. Focal length and distortion hold
-// at one zoom; the recording's own focal length shows whether it is that. So the recording alone is
-// calibrated first. A wanted value x that agrees, |x - x_alone| <= 5 sqrt(sigma^2 + sigma_alone^2),
-// becomes a prior of a second adjustment; distortion only if the focal length agrees. Remarks name
-// what is left out. If the recording alone has no solution, line delay and aspect are used
-// unchecked, with a remark. Pure, as calibrate(); takes twice its time.
+// at one zoom; the recording's own focal length shows whether it has that zoom. So the recording
+// alone is calibrated first. A wanted value x that agrees, |x - x_alone| <= 5 sqrt(sigma^2 +
+// sigma_alone^2), becomes a prior of a second adjustment; distortion only if the focal length
+// agrees. Remarks name what is left out. If the recording alone has no solution, line delay and
+// aspect are used unchecked, with a remark. Pure, as calibrate(); takes twice its time.
 
 #include <string>
 #include <vector>
@@ -17,7 +17,7 @@ namespace alidade {
 
 struct KnownValue {
   CalibrationPrior prior;
-  bool wanted = false;  // false: not known, or stated otherwise
+  bool wanted = false;  // false: not known, or given elsewhere
 };
 
 // For images of the recording's size. Units as in CalibrationOptions.
@@ -41,7 +41,7 @@ struct KnownCameraCalibration {
   std::vector<std::string> remarks;  // what was not used, and why
 };
 
-// options: priors stated otherwise. Known values that are accepted replace them.
+// options: priors given elsewhere. Known values that are accepted replace them.
 [[nodiscard]] KnownCameraCalibration calibrate_knowing(const CalibrationInput& input,
                                                        const CalibrationOptions& options,
                                                        const KnownCamera& known);

@@ -3,9 +3,9 @@
 // them.
 //   z_c = sum of F_i e_i over the observations of a cluster c    F_i influence, e_i residual
 //   growth of parameter p = sum_c z_c,p^2 / E sum_c z_c,p^2      E for independent errors
-// Observations of one landmark err alike where its patch looks alike, again and again; those of one
-// frame err alike where the trajectory bends more than its spline. The correlation may be of any
-// kind and last for any time: only different clusters must be independent. Derivation:
+// Observations of one landmark share an error while its patch looks the same, and those of one
+// frame while the trajectory bends more than its spline. The correlation within a cluster may have
+// any form and last for any time; only different clusters must be independent. Derivation:
 // docs/calibration.md. Allocates.
 
 #include <vector>

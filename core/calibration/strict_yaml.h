@@ -1,5 +1,5 @@
 #pragma once
-// Strict YAML, common to all files of the program. A key is a plain word, known, and stands once. A
+// Strict YAML, common to all files of the program. A key is a plain, known word that occurs once. A
 // number is finite and nothing but a number (number_text.h). An error is one line that names the
 // file and the line. The caller decides what it reads and how errors are worded:
 // parse_calibration() and the configuration's YamlSection. Allocates.

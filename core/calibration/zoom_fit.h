@@ -41,7 +41,7 @@ struct ZoomFitOptions {
     double sigma;
   };
   std::vector<Prior> shared_priors;
-  // Error of every clock offset alike. More calibrations do not average it out: it stays in the
+  // Error that all clock offsets share. More calibrations do not average it out: it stays in the
   // curve's clock offset.
   double common_clock_sigma_s = 0;
   // extend_zoom(): the curve's clock offset is of another connection.
@@ -85,9 +85,9 @@ struct ZoomFit {
 [[nodiscard]] std::vector<std::string> zoom_advice(const ZoomCurve& curve, double share = 0.01);
 
 // Adds one calibration to a curve; the result is the same as if all had been fitted together.
-// visit: the node that the calibration observes again, the zoom not moved since. Without visit it
-// gets a node of its own, possibly at the reading of another. A curve of kMaxNodes loses the inner
-// node whose neighbours are closest together; what it contributed to the others stays.
+// visit: the node that the calibration observes again, as the zoom has not moved since. Without
+// visit it gets a node of its own, possibly at another node's reading. A curve of kMaxNodes loses
+// the inner node whose neighbours are closest together; what it contributed to the others stays.
 [[nodiscard]] bool extend_zoom(const ZoomCurve& curve, const Calibration& added,
                                std::optional<int> visit, const ZoomFitOptions& options,
                                ZoomFit* fit, std::string* error);

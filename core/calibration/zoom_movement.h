@@ -32,7 +32,7 @@ struct ZoomMovement {
 // log_focal_length, covariance and rate_per_s are for the first dwell, the second, then each
 // reading.
 struct MovementObservation {
-  // Index of each dwell's calibration in fit_zoom(); nothing: it is none of them.
+  // Index of each dwell's calibration in fit_zoom(); empty: the dwell is not among them.
   std::optional<std::size_t> from;
   std::optional<std::size_t> to;
   std::vector<double> reading;

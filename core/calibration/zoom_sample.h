@@ -36,9 +36,9 @@ struct ZoomSample {
                                         const ZoomFitOptions& options, const Calibration& reference,
                                         ZoomSample* sample);
 
-// Takes the clock error that all telemetry polls share off a covariance's clock offset, as far as
-// the covariance stays positive: it is no error of a single calibration. places: rows that are not
-// exact. clock: the offset's row.
+// Subtracts the clock error that all telemetry polls share from a covariance's clock offset, as far
+// as the covariance stays positive: that error does not belong to a single calibration. places:
+// rows that are not exact. clock: the offset's row.
 void take_common_clock_error(const std::vector<int>& places, int clock, double common_sigma_s,
                              Eigen::MatrixXd* covariance);
 

@@ -1,6 +1,6 @@
 #pragma once
 // find_zoom_stretches(): the dwells of a recording, during which the zoom reading is constant. A
-// change that is shorter than a movement is a glitch and ends no dwell. Pure; allocates.
+// change that is shorter than a movement is a glitch and does not end a dwell. Pure; allocates.
 
 #include <vector>
 
@@ -19,7 +19,7 @@ struct ZoomStretch {
 
 struct ZoomStretchOptions {
   double tolerance = 0;   // device units; readings this close are equal
-  double glitch_s = 0.2;  // a shorter change is no movement
+  double glitch_s = 0.2;  // a shorter change is not a movement
   double least_s = 0;     // shorter dwells are left out
 };
 

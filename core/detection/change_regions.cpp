@@ -22,7 +22,7 @@ bool ChangeOptions::validate(const char** error) const {
   const char* problem = nullptr;
   if (most_boxes < 1) problem = "most_boxes must be at least 1";
   if (!(least_size_px > 0 && most_size_px >= least_size_px)) {
-    problem = "most_size_px must not be below least_size_px, which must be positive";
+    problem = "least_size_px must be positive, and most_size_px not below it";
   }
   if (!(merge_px >= 0)) problem = "merge_px must not be negative";
   if (!(threshold >= 3 && threshold <= 15)) problem = "threshold must be 3 to 15 sigmas";

@@ -17,7 +17,7 @@ namespace alidade {
 
 struct ChangeOptions {
   double threshold = 6.5;    // sigmas of S
-  double merge_px = 6;       // boxes with no more between them are merged
+  double merge_px = 6;       // boxes that are no farther apart are merged
   double least_size_px = 1;  // of a box, in its larger direction
   double most_size_px = 200;
   int most_boxes = 64;  // the surest

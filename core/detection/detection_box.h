@@ -1,7 +1,7 @@
 #pragma once
-// DetectionBox: a detection in a picture, by this folder or from outside: its smallest upright
-// rectangle and score. Pixels as in CONVENTIONS.md: the box spans [u, u + width] x [v, v + height].
-// One around the top-left pixel alone is (0, 0, 1, 1).
+// DetectionBox: a detection in a picture, found by this folder or elsewhere: its smallest upright
+// rectangle and its score. Pixels as in CONVENTIONS.md: the box spans [u, u + width] x [v, v +
+// height]. One around the top-left pixel alone is (0, 0, 1, 1).
 
 #include <string>
 

@@ -33,26 +33,27 @@ const char* to_string(MotionStatus status) {
     case MotionStatus::kOk:
       return "ok";
     case MotionStatus::kWrongImage:
-      return "no picture, or not of the size that was told";
+      return "no picture, or a picture of another size";
     case MotionStatus::kNoOrientation:
       return "no orientation";
     case MotionStatus::kNotNewer:
-      return "not later than the picture before";
+      return "the picture is not newer than the one before";
     case MotionStatus::kBlurred:
-      return "blurred by the camera's motion";
+      return "the picture is blurred by the camera's motion";
     case MotionStatus::kTooLittleOverlap:
-      return "too little of it was seen before";
+      return "too little of the picture was seen before";
     case MotionStatus::kNotExplained:
-      return "differs everywhere from what was seen before";
+      return "the whole picture differs from what was seen before";
   }
   return "unknown status";
 }
 
 bool MotionOptions::validate(const char** error) const {
   const char* problem = nullptr;
-  if (!(most_changed > 0 && most_changed <= 1)) problem = "most_changed must be above 0, at most 1";
+  if (!(most_changed > 0 && most_changed <= 1))
+    problem = "most_changed must be above 0 and at most 1";
   if (!(least_covered > 0 && least_covered <= 1)) {
-    problem = "least_covered must be above 0, at most 1";
+    problem = "least_covered must be above 0 and at most 1";
   }
   if (!(most_spread >= 1)) problem = "most_spread must be at least 1";
   if (!(most_shift_px > 0)) problem = "most_shift_px must be positive";

@@ -3,10 +3,10 @@
 // pixel is compared with the same direction in up to three earlier pictures (earlier_frames.h,
 // frame_warp.h), after a common small shift and the light are estimated (frame_match.h):
 //   z(u) = (now - light then(warp(u) + shift) - offset) / sigma          sigma: DifferenceModel
-// The smallest z of at least two counts, and 0 if they differ in sign. 5x5 pixels together decide
-// (change_regions.h). Method, reasons and limits: docs/motion_detection.md, docs/derivations.md.
-// The constructor takes all memory, some 12 bytes a pixel; find() allocates nothing. Equal calls
-// give equal results. For one thread.
+// Of at least two such z the smallest counts, or 0 if they differ in sign. 5x5 pixels together
+// decide (change_regions.h). Method, reasons and limits: docs/motion_detection.md,
+// docs/derivations.md. The constructor takes all memory, some 12 bytes a pixel; find() allocates
+// nothing. Equal calls give equal results. For one thread.
 
 #include <array>
 #include <vector>
@@ -22,16 +22,16 @@ namespace alidade {
 struct MotionOptions {
   int width = 1280;        // px, of all pictures
   int height = 720;        // px
-  double spacing_s = 0.3;  // between the older of the earlier pictures, of which there are five
-  // Error that remains of orientation, lens and air, one sigma.
+  double spacing_s = 0.3;  // between the five older ones of the earlier pictures
+  // Remaining error of orientation, lens and air, one sigma.
   double sigma_alignment_px = 0.1;
-  // Error by different blur, one sigma: half of the difference of its variances.
+  // Error due to different blur, one sigma: half of the difference of the blurs' variances.
   double sigma_blur_px2 = 0.03;
-  double exposure_s = 0.005;   // the longest exposure, about
+  double exposure_s = 0.005;   // about the longest exposure
   double most_blur_px = 8;     // by the camera's motion during the exposure
   double most_zoom = 0.1;      // |log| of the ratio of focal lengths of pictures that are compared
   double most_shift_px = 3;    // largest error of orientations
-  double most_spread = 4;      // of all differences, over what is expected
+  double most_spread = 4;      // spread of all differences over the expected one
   double least_covered = 0.3;  // of the picture, seen before
   double most_changed = 0.1;   // of the picture
   ChangeOptions change;
@@ -41,9 +41,9 @@ struct MotionOptions {
 
 enum class MotionStatus {
   kOk,
-  kWrongImage,     // none, or not of the size of options and calibration
-  kNoOrientation,  // mode none, or numbers that are not finite or of no camera
-  kNotNewer,       // not later than the picture before
+  kWrongImage,     // no picture, or its size is not that of options and calibration
+  kNoOrientation,  // mode none, or its numbers are not finite or describe no camera
+  kNotNewer,       // not newer than the picture before
   kBlurred,        // the camera turns too fast for the exposure
   // Too little of the picture was seen before: the first ones, after a jump or a change of zoom.
   kTooLittleOverlap,
@@ -57,7 +57,7 @@ struct MotionAnswer {
   MotionStatus status = MotionStatus::kOk;
   double covered = 0;   // share of the picture in which motion can be found
   double shift_px = 0;  // largest error of the compared pictures' orientations
-  double spread = 0;    // of differences over what was expected, the largest; 1: as expected
+  double spread = 0;    // largest spread of differences over the expected one; 1: as expected
   double changed = 0;   // share of the picture
 };
 
@@ -66,10 +66,11 @@ class MotionDetector {
   // options must be valid.
   explicit MotionDetector(const MotionOptions& options);
 
-  // Pictures refused with kWrongImage, kNoOrientation, kNotNewer or kBlurred are not compared with
-  // later.
+  // A picture refused with kWrongImage, kNoOrientation, kNotNewer or kBlurred is not kept for later
+  // comparisons.
   [[nodiscard]] MotionAnswer find(const ImageView& image, const FrameOrientation& orientation);
-  // Of the latest picture, surest first; none unless its status was kOk. Score: sigmas.
+  // The boxes of the latest picture, the surest first; empty unless its status was kOk. Score:
+  // sigmas.
   [[nodiscard]] const std::vector<DetectionBox>& boxes() const { return boxes_; }
   // Forgets all earlier pictures.
   void forget();

@@ -217,8 +217,8 @@ std::unique_ptr<NetworkDetector> NetworkDetector::load(const std::string& model,
   }
   if (network->net.empty()) {
     *error =
-        "is no ONNX network that OpenCV can read; export it with opset 12, static shape, 32 bits "
-        "a value";
+        "is not an ONNX network that OpenCV can read; export it with opset 12, a static shape and "
+        "32-bit values";
     return nullptr;
   }
   const std::string size =
@@ -226,25 +226,27 @@ std::unique_ptr<NetworkDetector> NetworkDetector::load(const std::string& model,
   network->input.create(options.height_px, options.width_px, CV_8UC3);
   network->input.setTo(cv::Scalar::all(kPaddingGrey));
   if (!network->prepare() || !network->forward()) {
-    *error = "takes no pictures of " + size +
-             " px with three channels; set width_px and height_px to what it was exported with";
+    *error =
+        "does not take pictures of " + size +
+        " px with three channels; set width_px and height_px to the size that it was exported for";
     return nullptr;
   }
   if (!layout_of(network->output, options, &network->layout)) {
     *error = "has an output of " + shape_of(network->output) +
-             "; expected 1x(4+classes)xN as of YOLOv8, or 1xNx(5+classes) as of YOLOv5";
+             "; expected 1x(4+classes)xN (YOLOv8) or 1xNx(5+classes) (YOLOv5)";
     return nullptr;
   }
   if (!network->places_are_pixels(options)) {
     *error =
-        "tells boxes that are not in pixels of its input: normalised, or of a YOLOX before they "
-        "are decoded";
+        "gives boxes that are not in pixels of its input (normalised, or of a YOLOX without its "
+        "decoding); export it with boxes in pixels";
     return nullptr;
   }
   const auto classes = static_cast<std::size_t>(network->layout.classes);
   if (!options.labels.empty() && options.labels.size() != classes) {
-    *error = "tells " + std::to_string(classes) + " classes, but there are " +
-             std::to_string(options.labels.size()) + " labels; expected as many, one a line";
+    *error = "has " + std::to_string(classes) + " classes, but there are " +
+             std::to_string(options.labels.size()) +
+             " labels; give one label for each class, one a line";
     return nullptr;
   }
   return std::unique_ptr<NetworkDetector>(new NetworkDetector(std::move(network), options));

@@ -2,7 +2,7 @@
 // NetworkDetector: a user's YOLO, exported to ONNX, by OpenCV's cv::dnn. One input of 1 x 3 x
 // height x width, one output in pixels of the input, scores 0 to 1, N candidates of C classes:
 //   1 x (4 + C) x N   YOLOv8: centre u, v, width, height, C class scores
-//   1 x N x (5 + C)   YOLOv5: as well, with objectness before the class scores, which it multiplies
+//   1 x N x (5 + C)   YOLOv5: the same, and before the class scores objectness, their factor
 // The picture is scaled to fit, in proportion, into the input's middle; the rest is grey 114
 // (letterbox); values 0 to 1. All three channels are the grey levels. Of overlapping boxes of any
 // class the surest stays (NMSBoxes). Takes scratch memory and threads as OpenCV does: not for the
@@ -23,7 +23,7 @@ struct NetworkOptions {
   double threshold = 0.25;          // of the score
   double most_overlap = 0.45;       // of two boxes that both stay
   int most_boxes = 64;              // the surest
-  std::vector<std::string> labels;  // of classes 0, 1, ...; none: numbers
+  std::vector<std::string> labels;  // of classes 0, 1, ...; empty: numbers are used
 
   [[nodiscard]] bool validate(const char** error = nullptr) const;
 };
@@ -36,11 +36,11 @@ enum class NetworkStatus {
 
 class NetworkDetector {
  public:
-  // model: the bytes of a file. options must be valid. Runs once on an empty picture. The two
-  // outputs are distinguished by N, which is that of grids of strides 8, 16 and 32, times three for
-  // v5; else there are more candidates than values. (An export with NMS, 1 x N x 6, looks like
-  // v5's.) Null and one line in *error: not an ONNX network, not for this input, not of this
-  // output, boxes not in pixels, or a different number of classes.
+  // model: the bytes of a file. options must be valid. Runs once on an empty picture. N shows which
+  // output it is: v8 has one candidate for each cell of grids of strides 8, 16 and 32, v5 has
+  // three. Any other output is taken to have more candidates than values. (An export with NMS, 1 x
+  // N x 6, looks like v5's.) Null and one line in *error: not an ONNX network, not for this input,
+  // not of this output, boxes not in pixels, or a different number of classes.
   [[nodiscard]] static std::unique_ptr<NetworkDetector> load(const std::string& model,
                                                              const NetworkOptions& options,
                                                              std::string* error);

@@ -64,11 +64,11 @@ const char* to_string(PersonStatus status) {
     case PersonStatus::kOk:
       return "ok";
     case PersonStatus::kNoImage:
-      return "no picture, or not of the calibration's size";
+      return "no picture, or a picture that is not of the calibration's size";
     case PersonStatus::kNoOrientation:
       return "no orientation";
     case PersonStatus::kNowhere:
-      return "nowhere in the picture are people of a size that can be found";
+      return "no part of the picture shows people at a size that can be found";
   }
   return "unknown status";
 }
@@ -79,13 +79,13 @@ bool PersonOptions::validate(const char** error) const {
   if (!(most_overlap >= 0 && most_overlap <= 1)) problem = "most_overlap must be 0 to 1";
   if (!std::isfinite(threshold)) problem = "threshold must be finite";
   if (!(least_height_px >= 24 && most_height_px >= least_height_px)) {
-    problem = "least_height_px must be at least 24, most_height_px not below it";
+    problem = "least_height_px must be at least 24, and most_height_px not below it";
   }
-  if (!(height_step > 1 && height_step <= 2)) problem = "height_step must be above 1, at most 2";
+  if (!(height_step > 1 && height_step <= 2)) problem = "height_step must be above 1 and at most 2";
   if (!(height_tolerance > 0 && height_tolerance <= 1)) {
-    problem = "height_tolerance must be above 0, at most 1";
+    problem = "height_tolerance must be above 0 and at most 1";
   }
-  if (!(height_m > 0 && height_m < 100)) problem = "height_m must be above 0, below 100";
+  if (!(height_m > 0 && height_m < 100)) problem = "height_m must be above 0 and below 100";
   if (error != nullptr && problem != nullptr) *error = problem;
   return problem == nullptr;
 }

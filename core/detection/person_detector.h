@@ -33,7 +33,7 @@ struct PersonOptions {
 
 enum class PersonStatus {
   kOk,
-  kNoImage,        // not valid, or not of the calibration's size
+  kNoImage,        // not valid, or its size is not the calibration's
   kNoOrientation,  // mode none
   // Everywhere people would be too small or too large, or no ground is in view.
   kNowhere

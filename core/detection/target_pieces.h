@@ -1,8 +1,8 @@
 #pragma once
 // join_target_pieces(): a target that is large for its speed changes the picture only along its
-// outline, as its inside of one grey level lies over itself in the earlier pictures. Pieces of the
-// outline stand around the unchanged inside, whose grey level most changed pixels of one piece show
-// as well. Two boxes are of one thing if
+// outline, because its even inside covers itself in the earlier pictures. Pieces of the outline
+// stand around the unchanged inside, whose grey level most changed pixels of one piece show as
+// well. Two boxes are of one thing if
 //   |g - m| < c / 3   for three quarters of the pixels between, and
 //   |g - m| < c / 2   for most changed pixels of one of the boxes
 // g: grey level, m: its median on the line between the boxes' middles, c: mean change of the box's

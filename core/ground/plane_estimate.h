@@ -35,7 +35,7 @@ struct PlaneValues {
   J.topLeftCorner<3, 3>() = attitude_jacobian(attitude).inverse();
   out.covariance = J * plane.covariance * J.transpose();
   out.covariance = (out.covariance + out.covariance.transpose()).eval() / 2;
-  // A heading that is defined by the base has no variance but rounding.
+  // A heading that the base defines has no variance except rounding.
   if (out.covariance(0, 0) < 1e-20 * out.covariance.topLeftCorner<3, 3>().trace()) {
     out.covariance.row(0).setZero();
     out.covariance.col(0).setZero();

@@ -21,7 +21,7 @@ struct PlaneSight {
 
 // kHeight, kPlace, kLevel, kHeading: of the camera or its base.
 // kPoint: direction to something with a known place in w, on the plane or above it.
-// kHorizon: direction of no elevation: of the horizon, or the vanishing point of a line on the
+// kHorizon: a direction with elevation 0: of the horizon, or the vanishing point of a line on the
 // plane.
 // kBearing: such a direction with known heading, as of a street in a map.
 // kVertical: vanishing point of upright edges: straight up or straight down.
@@ -58,7 +58,7 @@ struct PlaneEvidence {
   std::vector<PlaneDatum> data;
   // Covariance of each look's turn about the base's axes, rad^2.
   std::vector<Matrix3<double>> looks;
-  bool y_is_north = false;  // places are on Earth: a heading must come from the data
+  bool y_is_north = false;  // places are on Earth, so a heading must come from the data
 };
 
 [[nodiscard]] inline PlaneDatum camera_height(double height_m, double sigma_m) {

@@ -141,7 +141,8 @@ const char* how_to_hold(const std::string& what) {
     return "give the base's level, points of the horizon, upright targets or known points in other "
            "directions";
   if (what == "heading") return "give a heading, a bearing or another known point";
-  if (what == "height") return "give the camera's height, a length or an upright target nearer by";
+  if (what == "height")
+    return "give the camera's height, or a length or an upright target nearer to the camera";
   return "give the camera's place or another known point";
 }
 
@@ -174,8 +175,8 @@ std::string moved_most(const Matrix<double, kPlaneParameterCount, 1>& change, do
 PlaneFit undetermined(const PlaneEvidence& evidence, const std::string& what) {
   if (points_in_a_line(evidence) && what.find("tilt") != std::string::npos) {
     return refused(PlaneFitStatus::kUndetermined,
-                   "the known points lie in a line: nothing holds the turn about it; give one "
-                   "beside the line, or the base's level");
+                   "the known points lie on a line, about which the plane can still turn; give "
+                   "a point beside the line, or the base's level");
   }
   const std::string first = what.substr(0, what.find(' '));
   return refused(PlaneFitStatus::kUndetermined, what + (what == first ? " is" : " are") +
@@ -211,7 +212,7 @@ bool set_covariance(const PlaneEvidence& evidence, const PlaneFitOptions& option
   if (sigma[5] > options.most_height_share * height) {
     if (height < 0.01 * scale) {
       *out = refused(PlaneFitStatus::kCameraOnPlane,
-                     "the plane goes through the camera: it sees all of it edge-on");
+                     "the plane goes through the camera, which sees it edge-on");
     } else {
       *out = undetermined(evidence, "height");
     }
@@ -372,15 +373,15 @@ PlaneFit fit_plane(const PlaneEvidence& evidence, const PlaneFitOptions& options
   }
   if (!has_scale(evidence)) {
     return refused(PlaneFitStatus::kNoScale,
-                   "nothing says how large anything is: give the camera's height, a known point, a "
-                   "length or an upright target");
+                   "nothing gives the scale: give the camera's height, a known point, a length "
+                   "or an upright target");
   }
   const PlaneProblem problem(evidence);
   const BestSolution found = solve_all(problem);
   if (!found.best) {
     return refused(PlaneFitStatus::kNoSolution,
-                   "no plane was found on which all data mean something: is a foot or a point of a "
-                   "length above the horizon?");
+                   "no plane was found that all data can lie on: is a foot, or an end of a "
+                   "length, above the horizon?");
   }
   const PlaneSolution& solution = *found.best;
   PlaneFit out;
@@ -391,7 +392,7 @@ PlaneFit fit_plane(const PlaneEvidence& evidence, const PlaneFitOptions& options
   if (!set_covariance(evidence, options, solution, &out)) return out;
   if (found.ambiguous || !grows_evenly(problem, solution)) {
     return refused(PlaneFitStatus::kAmbiguous,
-                   "another plane fits alike: give the base's level or another known point");
+                   "another plane fits equally well: give the base's level or another known point");
   }
   const std::vector<double> squares = set_misfits(problem, solution, &out);
   out.chi_square = solution.chi_square;
@@ -406,7 +407,7 @@ PlaneFit fit_plane(const PlaneEvidence& evidence, const PlaneFitOptions& options
   out.status = out.worst < 0 ? PlaneFitStatus::kOk : PlaneFitStatus::kMisfit;
   if (out.worst >= 0) {
     out.message = evidence.data[static_cast<std::size_t>(out.worst)].name +
-                  " does not fit: without it the others agree best; correct it or leave it out";
+                  " does not fit: the others agree best without it; correct it or leave it out";
   }
   return out;
 }

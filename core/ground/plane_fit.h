@@ -4,8 +4,9 @@
 // The covariance of (xi, p) is first order; it grows by chi-square per degree of freedom if that is
 // beyond chance (1 in 1000). A misfit is sqrt(r^T Q^+ r / rank), Q the covariance of the residual r
 // after the fit (Baarda's data snooping); 1 is expected. kMisfit names the datum without which the
-// others agree best. The weakest direction of the information says what is free. If data fit either
-// way up, as points of the horizon do, the base's down axis is taken to be below the horizontal.
+// others agree best. The weakest direction of the information shows what the data leave open. If
+// data fit either way up, as points of the horizon do, the base's down axis is taken to be below
+// the horizontal.
 
 #include <optional>
 #include <string>
@@ -31,7 +32,7 @@ enum class PlaneFitStatus {
   kNoScale,        // nothing gives a length
   kUndetermined,   // see message
   kCameraOnPlane,  // the plane goes through the camera
-  kAmbiguous,      // another plane fits alike
+  kAmbiguous,      // another plane fits equally well
   kMisfit,         // a datum is grossly wrong: see worst
   kNoSolution      // no plane on which all data are defined
 };
@@ -39,7 +40,7 @@ enum class PlaneFitStatus {
 [[nodiscard]] const char* to_string(PlaneFitStatus status);
 
 struct DatumFit {
-  std::optional<double> misfit;  // 1 is expected; nothing: no other data check it
+  std::optional<double> misfit;  // 1 is expected; empty: no other data check it
   double checked = 0;            // 0 to 1; how far the other data determine it, too
 };
 

@@ -22,8 +22,8 @@ using SymmetricEigen = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>;
 enum class PlaneFrame {
   kCamera,   // origin below the camera, Y below the base's forward direction
   kHeading,  // origin below the camera, headings as the data count them
-  kPlace,    // origin as the data's one place has it, Y below the base's forward direction
-  kUser      // as the data's places have it
+  kPlace,    // origin by the data's one place, Y below the base's forward direction
+  kUser      // by the data's places
 };
 
 struct PlaneProblem {
@@ -41,7 +41,7 @@ using PlaneUnknowns = Eigen::Matrix<double, kPlaneParameterCount, Eigen::Dynamic
                                     kPlaneParameterCount, kPlaneParameterCount>;
 [[nodiscard]] PlaneUnknowns plane_unknowns(PlaneFrame frame, const WorldPlane& plane);
 
-// The plane in the camera's frame, if w is that; otherwise unchanged.
+// The plane in the camera's frame, if w is the camera's; otherwise unchanged.
 [[nodiscard]] WorldPlane in_frame(PlaneFrame frame, const WorldPlane& plane);
 
 struct PlaneSolution {

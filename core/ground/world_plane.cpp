@@ -28,7 +28,7 @@ const char* to_string(PlaneStatus status) {
     case PlaneStatus::kAboveHorizon:
       return "above the horizon";
     case PlaneStatus::kTooFar:
-      return "too near the horizon: the place is not known";
+      return "too near the horizon: the place is too uncertain";
     case PlaneStatus::kCameraOnPlane:
       return "the camera is not above the plane";
     case PlaneStatus::kNoDirection:

@@ -40,9 +40,9 @@ using NearFeatures = std::array<NearFeature, kNearFeatures>;
 [[nodiscard]] std::vector<NearFeatures> nearest_features(const std::vector<Descriptor>& queries,
                                                          const std::vector<Descriptor>& indexed);
 
-// The ratio test. is_same(a, b): whether two indexed features show one thing; such a second nearest
-// is no rival. Empty: none do. Returns matches in increasing order of query, each indexed feature
-// at most once.
+// The ratio test. is_same(a, b): whether two indexed features show the same thing; if so, the
+// second nearest is not a rival. An empty function: no two do. Returns matches in increasing order
+// of query, each indexed feature at most once.
 [[nodiscard]] std::vector<FeatureMatch> believed_matches(
     const std::vector<NearFeatures>& near, double ratio,
     const std::function<bool(int, int)>& is_same = {});

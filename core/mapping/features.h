@@ -41,8 +41,8 @@ struct FeatureOptions {
   double contrast_threshold = 0.02;  // SIFT's; OpenCV's default is 0.04
   // Least distance of two features. SIFT gives some blobs two orientations; one is kept.
   double least_distance_px = 1.5;
-  // 1, 2 or 4: searches an image with so many times fewer pixels a side. Faster, without the
-  // smallest features.
+  // 1, 2 or 4: searches an image with this factor fewer pixels a side. Faster, without the smallest
+  // features.
   int shrink = 1;
 };
 
@@ -55,8 +55,8 @@ class FeatureDetector {
   FeatureDetector(const FeatureDetector&) = delete;
   FeatureDetector& operator=(const FeatureDetector&) = delete;
 
-  // 8-bit luma, row v at luma + v * stride. Empty if there are no features, or no image of
-  // kLeastImage_px.
+  // 8-bit luma, row v at luma + v * stride. Empty if there are no features, or a side is shorter
+  // than kLeastImage_px.
   [[nodiscard]] FeatureSet find(const std::uint8_t* luma, int width, int height,
                                 std::ptrdiff_t stride) const;
 

@@ -21,7 +21,7 @@ struct KeyframeChoiceOptions {
 
   [[nodiscard]] bool validate(const char** error = nullptr) const {
     const char* what = nullptr;
-    if (!(step_fields > 0 && step_fields <= 1)) what = "step_fields must be above 0, at most 1";
+    if (!(step_fields > 0 && step_fields <= 1)) what = "step_fields must be above 0 and at most 1";
     if (!(step_log_f > 0)) what = "step_log_f must be above 0";
     if (!(most_motion_px > 0)) what = "most_motion_px must be above 0";
     if (!(most_log_f_change > 0)) what = "most_log_f_change must be above 0";

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <unordered_map>
 
+#include "core/mapping/map_projection.h"
 #include "core/mapping/sphere_cell.h"
 #include "core/mapping/upkeep_picture.h"
 

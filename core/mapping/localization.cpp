@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/mapping/feature_matching.h"
+#include "core/mapping/map_projection.h"
 #include "core/model/direction.h"
 
 namespace alidade {

@@ -4,8 +4,8 @@
 // Without, or if that fails, k-d trees over all landmarks' descriptors retrieve keyframes.
 // picture_pose.h finds the pose; a second pass uses all landmarks that should be seen there. The
 // pose holds for the map's reference row, its middle one. Details: docs/derivations.md.
-// Refuses what could be wrong: too few matches, too small a share of them that agrees, two places
-// that fit. Repeated texture fails the ratio test or has a rival.
+// Refuses what could be wrong: too few matches, too few of them that agree, two places that fit.
+// Repeated texture fails the ratio test or has a rival.
 // Batch work: allocates. One thread at a time.
 
 #include <memory>

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "core/mapping/map_costs.h"
+#include "core/mapping/map_projection.h"
 #include "core/mapping/match_graph.h"
 #include "core/model/direction.h"
 

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "core/mapping/lens_curve.h"
-#include "core/mapping/map_projection.h"
+#include "core/mapping/picture_motion.h"
 
 namespace alidade {
 
@@ -54,7 +54,7 @@ struct MapOptions {
   static_assert(kDistortionCount == 1, "a sigma for each quantity");
   LensQuantities level_sigma{0.05, 0.1, 30, 30};
   LensQuantities bend_sigma{0.02, 0.02, 3, 3};
-  double hold_sigma = 0.5;  // of the lens's hold about that of `lens`
+  double hold_sigma = 0.5;  // of the lens's hold, about the hold of `lens`
   // rad; a start direction farther than this from its landmark's others is not used.
   double most_start_error = 0.1;
   double gate_sigmas = 4;  // times the noise that was found

@@ -7,6 +7,7 @@
 
 #include "core/mapping/feature_tracks.h"
 #include "core/mapping/map_making.h"
+#include "core/mapping/map_projection.h"
 #include "core/mapping/match_graph.h"
 #include "core/mapping/place_noise.h"
 
@@ -372,9 +373,9 @@ const char* to_string(MapBuildStatus status) {
     case MapBuildStatus::kOk:
       return "ok";
     case MapBuildStatus::kBadInput:
-      return "options out of range, or no two pictures";
+      return "options out of range, or fewer than two pictures";
     case MapBuildStatus::kNoTexture:
-      return "fewer than two pictures have texture enough";
+      return "fewer than two pictures have enough texture";
     case MapBuildStatus::kNoFocalLength:
       return "no focal length fits the pictures";
     case MapBuildStatus::kNotConnected:
@@ -393,13 +394,13 @@ bool MapBuildOptions::validate(const char** error) const {
   } else if (!std::isfinite(line_delay)) {
     what = "line_delay must be finite";
   } else if (lens && (lens->width() != width || lens->height() != height)) {
-    what = "the lens is of another image size";
+    what = "the lens is for another image size";
   } else if (!(log_f_sigma > 0) || !(repeatability > 0) || !(lens_spacing > 0)) {
     what = "log_f_sigma, repeatability and lens_spacing must be above 0";
   } else if (first_features < 20 || least_features < 1 || least_group < 1) {
-    what = "first_features must be 20 or more, least_features and least_group 1 or more";
+    what = "first_features must be at least 20, least_features and least_group at least 1";
   } else if (!(gate_px > 0) || !(gate_sigmas > 0)) {
-    what = "gates must be above 0";
+    what = "gate_px and gate_sigmas must be above 0";
   }
   if (what != nullptr && error != nullptr) *error = what;
   return what == nullptr;

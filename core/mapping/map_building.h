@@ -26,7 +26,7 @@ struct MapView {
   std::int64_t frame = 0;
   double time_utc_s = 0;
   std::optional<double> zoom;
-  // From zoom reading and data sheet or calibration; all pictures have it or none.
+  // From zoom reading and data sheet or calibration; either all pictures have it or none has.
   std::optional<double> log_f;
   std::optional<PanTilt<double>> telemetry;  // measured angles
   // rad, of telemetry's orientation: noise, backlash, uncertainty of the axes.
@@ -54,7 +54,7 @@ struct MapBuildOptions {
   double gate_px = 1.5;
   double gate_sigmas = 6;
   int least_features = 30;  // of a usable picture
-  // The map is refused if an unconnected part has so many pictures.
+  // The map is refused if an unconnected part has this many pictures.
   int least_group = 3;
   bool largest_part = false;  // use the largest part even then
 

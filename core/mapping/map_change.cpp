@@ -16,7 +16,8 @@ bool may_follow(const std::vector<T>& parts, std::int64_t first, const char* kin
                 std::string* error) {
   for (const T& part : parts) {
     if (part.id < first) {
-      return refuse(std::string(kind) + " " + std::to_string(part.id) + " has no new id", error);
+      return refuse(
+          std::string(kind) + " " + std::to_string(part.id) + " has an id that is not new", error);
     }
     if (!is_valid(part, error)) return false;
     first = part.id + 1;
@@ -31,7 +32,7 @@ bool sees_known_keyframes(const SceneLandmark& landmark, const MapChange& change
     if (keyframe_index(map, sighting.keyframe) < 0 &&
         std::none_of(change.new_keyframes.begin(), change.new_keyframes.end(), is_it)) {
       return refuse("landmark " + std::to_string(landmark.id) + " is seen by keyframe " +
-                        std::to_string(sighting.keyframe) + ", which there is not",
+                        std::to_string(sighting.keyframe) + ", which does not exist",
                     error);
     }
   }
@@ -52,15 +53,16 @@ bool fits(const MapChange& change, const SceneMap& map, std::string* error) {
   for (const SceneLandmark& landmark : change.changed) {
     if (landmark_index(map, landmark.id) < 0 ||
         std::binary_search(change.died.begin(), change.died.end(), landmark.id)) {
-      return refuse("landmark " + std::to_string(landmark.id) + " changes, and is not there",
-                    error);
+      return refuse(
+          "landmark " + std::to_string(landmark.id) + " is changed, but is not in the map", error);
     }
   }
   for (std::size_t i = 0; i < change.died.size(); ++i) {
     if (landmark_index(map, change.died[i]) < 0 ||
         (i > 0 && change.died[i] <= change.died[i - 1])) {
-      return refuse("landmark " + std::to_string(change.died[i]) + " dies, and is not there",
-                    error);
+      return refuse(
+          "landmark " + std::to_string(change.died[i]) + " is removed, but is not in the map",
+          error);
     }
   }
   for (const std::vector<SceneLandmark>* landmarks : {&change.changed, &change.born}) {

@@ -14,7 +14,7 @@ struct MapChange {
   std::vector<SceneKeyframe> new_keyframes;  // increasing ids, above all existing ones
   std::vector<SceneLandmark> changed;        // in their new state; increasing ids
   std::vector<SceneLandmark> born;           // increasing ids, from the map's next_landmark on
-  std::vector<std::int64_t> died;            // increasing; none of `changed`
+  std::vector<std::int64_t> died;            // increasing; not in `changed`
 
   [[nodiscard]] bool empty() const {
     return new_keyframes.empty() && changed.empty() && born.empty() && died.empty();

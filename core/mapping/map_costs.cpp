@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 
+#include "core/mapping/map_projection.h"
 #include "core/model/direction.h"
 
 namespace alidade::internal {

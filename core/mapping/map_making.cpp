@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <utility>
 
+#include "core/mapping/map_projection.h"
 #include "core/model/direction.h"
 #include "core/model/linear_algebra.h"
 

@@ -2,8 +2,8 @@
 // make_scene_map(): turns an adjustment into a scene map: its keyframes, and landmarks with
 // covariances. A landmark is a track with two or more observations that the adjustment kept, or a
 // feature that only one picture has seen. Its own covariance comes from its observations, in
-// tangent_basis(d_b). The common one comes from pose and f of the keyframe that knows its direction
-// best. Base frame, rad and px. Batch work: allocates.
+// tangent_basis(d_b). The common one comes from pose and f of the keyframe in which its direction
+// is known best. Base frame, rad and px. Batch work: allocates.
 
 #include <optional>
 #include <vector>
@@ -26,7 +26,7 @@ struct MapMaterial {
   std::vector<const LinkedPicture*> pictures;
 };
 
-// Norm of each observation's residual, px; nothing if it was left out.
+// Norm of each observation's residual, px; empty if it was left out.
 [[nodiscard]] std::vector<std::optional<double>> errors_px(const MapEvidence& evidence,
                                                            const MapAdjustment& found);
 

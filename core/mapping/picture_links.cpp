@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <set>
 
+#include "core/mapping/map_projection.h"
 #include "core/model/mechanics.h"
 
 namespace alidade {

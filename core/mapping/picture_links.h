@@ -1,7 +1,7 @@
 #pragma once
 // Pairs of pictures: which are worth comparing, their matches, and whether a rotation and a change
-// of f explain these. Compared are pictures that by telemetry and zoom see the same; without
-// telemetry those that retrieval over all features suggests. A link is checked as the pose of one
+// of f explain these. Pictures are compared if they see the same by telemetry and zoom or, without
+// telemetry, if retrieval over all features suggests them. A link is checked as the pose of one
 // picture in the other's frame (picture_pose.h). The lens need not be known yet: the threshold
 // allows for its distortion. Batch work: allocates. Pure.
 
@@ -12,7 +12,7 @@
 #include "core/mapping/feature_matching.h"
 #include "core/mapping/features.h"
 #include "core/mapping/lens_curve.h"
-#include "core/mapping/map_projection.h"
+#include "core/mapping/picture_motion.h"
 #include "core/mapping/picture_pose.h"
 
 namespace alidade {

@@ -8,6 +8,7 @@
 #include <limits>
 #include <random>
 
+#include "core/mapping/map_projection.h"
 #include "core/mapping/pose_adjustment.h"
 #include "core/mapping/two_point_pose.h"
 #include "core/model/nearest_angles.h"
@@ -201,13 +202,13 @@ const char* to_string(PoseStatus status) {
     case PoseStatus::kTooFewMatches:
       return "too few matches";
     case PoseStatus::kNoPose:
-      return "no pose that enough matches agree with";
+      return "no pose fits enough matches";
     case PoseStatus::kByChance:
       return "as many matches would agree by chance";
     case PoseStatus::kOneSpot:
       return "the matches lie in one spot of the image";
     case PoseStatus::kCollinear:
-      return "the matches lie about one line";
+      return "the matches lie near one line";
     case PoseStatus::kRival:
       return "another pose explains nearly as many matches";
     case PoseStatus::kNotDetermined:

@@ -2,8 +2,8 @@
 // find_pose(): where a picture looks, and with which f, from matches of its features with
 // directions of the map. Unknowns: R_base_from_camera at the reference row, and log f. With a mount
 // only pan and tilt turn the camera (mechanics.h); without, the rotation is free. The motion during
-// the read-out (map_projection.h) is known, or estimated with a prior, as rows exposed one after
-// another show it.
+// the read-out (map_projection.h) is known, or estimated with a prior, which is possible as the
+// rows are exposed one after another.
 // The covariance grows if residuals exceed their sigmas. Refuses what could be wrong, see
 // PoseStatus. Equal input gives equal results. Allocates; no shared state. Method:
 // docs/derivations.md.
@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "core/mapping/lens_curve.h"
-#include "core/mapping/map_projection.h"
+#include "core/mapping/picture_motion.h"
 #include "core/model/angle.h"
 #include "core/model/mechanics.h"
 

@@ -25,8 +25,8 @@ class PlaceNoise {
   // px; of each coordinate of a feature of that size.
   [[nodiscard]] double sigma_px(double scale_px) const { return sigma_[bin(scale_px)]; }
 
-  // scale_and_error: size of the feature and norm of the error, px. Bins with fewer than 100 are no
-  // sharper than the one below.
+  // scale_and_error: size of the feature and norm of the error, px. A bin with fewer than 100 is
+  // not sharper than the bin below it.
   void learn(const std::vector<std::pair<double, double>>& scale_and_error) {
     constexpr std::size_t kFewest = 100;
     const double median_of_norm = std::sqrt(2 * std::log(2.0));

@@ -6,7 +6,9 @@
 #include <cmath>
 #include <cstddef>
 
+#include "core/mapping/map_projection.h"
 #include "core/model/nearest_angles.h"
+#include "core/model/rolling_shutter.h"
 
 namespace alidade {
 namespace internal {

@@ -28,8 +28,8 @@ struct PoseFit {
 
 [[nodiscard]] bool has_unknown_motion(const PoseKnowledge& knowledge);
 
-// Whether the estimated motion during the read-out is faster than any head, where the method was
-// not checked.
+// Whether the estimated motion during the read-out is faster than any head, for which the method
+// was not checked.
 [[nodiscard]] bool moves_too_far(const PoseKnowledge& knowledge, const PoseState& state);
 
 // Levenberg-Marquardt with Huber's loss in sigmas times `noise`. False: a step is not finite or
@@ -38,7 +38,7 @@ struct PoseFit {
                                const std::vector<int>& inliers, const PoseKnowledge& knowledge,
                                double noise, int max_steps, PoseState* state);
 
-// How much larger the residuals are than claimed; at least 1.
+// How much larger the residuals are than their sigmas; at least 1.
 [[nodiscard]] double noise_of(const std::vector<PoseMatch>& matches,
                               const std::vector<int>& inliers, const PoseKnowledge& knowledge,
                               const PoseState& state);

@@ -52,38 +52,40 @@ bool is_log_focal_length(double log_f) { return log_f > -1 && log_f < 21; }
 
 const char* flaw_of(const SceneKeyframe& k) {
   if (!is_id(k.id)) return "has an id out of range";
-  if (k.recording.size() > SceneMap::kMostNameBytes) return "has too long a recording's name";
+  if (k.recording.size() > SceneMap::kMostNameBytes)
+    return "has a recording's name that is too long";
   if (k.frame < 0) return "has a negative frame number";
-  if (!is_time(k.time_utc_s)) return "has a time that is none";
+  if (!is_time(k.time_utc_s)) return "has a time out of range";
   if (k.zoom && !std::isfinite(*k.zoom)) return "has a zoom reading that is not finite";
   if (k.telemetry && !k.telemetry->vector().allFinite()) return "has telemetry that is not finite";
   if (!is_log_focal_length(k.position) || !(std::abs(k.eps) < 1)) {
     return "has a focal length out of range";
   }
   if (!(std::abs(k.R_base_from_camera.norm() - 1) <= kUnitTolerance)) {
-    return "has an orientation that is no rotation";
+    return "has an orientation that is not a rotation";
   }
-  if (!is_covariance_matrix(k.covariance)) return "has a covariance that is none";
+  if (!is_covariance_matrix(k.covariance)) return "has a matrix that is not a covariance";
   if (!k.angular_velocity.allFinite() || !std::isfinite(k.zoom_rate)) {
     return "has a rate that is not finite";
   }
-  if (!(k.residual_px >= 0) || !std::isfinite(k.residual_px)) return "has a residual that is none";
-  if (k.picture.size() > SceneMap::kMostPictureBytes) return "has too large a picture";
+  if (!(k.residual_px >= 0) || !std::isfinite(k.residual_px))
+    return "has a residual that is negative or not finite";
+  if (k.picture.size() > SceneMap::kMostPictureBytes) return "has a picture that is too large";
   return nullptr;
 }
 
 const char* flaw_of(const SceneLandmark& l) {
   if (!is_id(l.id)) return "has an id out of range";
-  if (!is_unit_vector(l.d_b)) return "has a direction that is no unit vector";
+  if (!is_unit_vector(l.d_b)) return "has a direction that is not a unit vector";
   if (!is_covariance_matrix(l.covariance) || !is_covariance_matrix(l.shared_covariance)) {
-    return "has a covariance that is none";
+    return "has a matrix that is not a covariance";
   }
   if (!(l.scale_rad > 0) || !(l.scale_rad < 1)) return "has a size out of range";
   if (!(l.focal_length_px > 0) || !is_log_focal_length(std::log(l.focal_length_px))) {
     return "has a focal length out of range";
   }
   if (!is_time(l.life.born_utc_s) || !is_time(l.life.last_seen_utc_s)) {
-    return "has a time that is none";
+    return "has a time out of range";
   }
   if (l.life.matched > l.life.looked_for) return "was found more often than looked for";
   std::int64_t before = 0;
@@ -91,7 +93,8 @@ const char* flaw_of(const SceneLandmark& l) {
     if (s.keyframe <= before) return "has sightings out of order";
     before = s.keyframe;
     if (!s.u.allFinite()) return "has a sighting that is not finite";
-    if (!(s.scale_px > 0) || !std::isfinite(s.scale_px)) return "has a sighting of no size";
+    if (!(s.scale_px > 0) || !std::isfinite(s.scale_px))
+      return "has a sighting whose size is not above 0";
   }
   return nullptr;
 }
@@ -123,7 +126,7 @@ std::ptrdiff_t index_of(const std::vector<T>& parts, std::int64_t id) {
 
 bool check_lens(const LensCurve& lens, std::string* error) {
   if (lens.segments() < 1 || lens.control_points() > SceneMap::kMostLensPoints) {
-    return refuse("the lens has no curve, or one of too many points", error);
+    return refuse("the lens has no curve, or a curve of too many points", error);
   }
   for (const int side : {lens.width(), lens.height()}) {
     if (side < 1 || side > SceneMap::kMostImageSide) {
@@ -150,11 +153,11 @@ bool check_lens(const LensCurve& lens, std::string* error) {
 
 bool check_mechanics(const Mechanics<double>& m, std::string* error) {
   if (!is_unit_vector(m.pan_axis) || !is_unit_vector(m.tilt_axis)) {
-    return refuse("an axis of the mechanics is no unit vector", error);
+    return refuse("an axis of the mechanics is not a unit vector", error);
   }
   for (const double scale : {m.pan_scale, m.tilt_scale}) {
     if (!std::isfinite(scale) || scale == 0)
-      return refuse("a scale of the mechanics is none", error);
+      return refuse("a scale of the mechanics is 0 or not finite", error);
   }
   return true;
 }
@@ -205,7 +208,7 @@ bool is_valid(const SceneMap& map, std::string* error) {
     for (const SceneSighting& sighting : landmark.sightings) {
       if (keyframe_index(map, sighting.keyframe) < 0) {
         return refuse("landmark " + std::to_string(landmark.id) + " is seen by keyframe " +
-                          std::to_string(sighting.keyframe) + ", which there is not",
+                          std::to_string(sighting.keyframe) + ", which does not exist",
                       error);
       }
     }
@@ -216,9 +219,9 @@ bool is_valid(const SceneMap& map, std::string* error) {
                   error);
   }
   const std::int64_t last = map.landmarks.empty() ? 0 : map.landmarks.back().id;
-  if (map.next_landmark <= last) return refuse("a landmark's id would be given twice", error);
+  if (map.next_landmark <= last) return refuse("the next landmark's id is already in use", error);
   if (map.next_landmark > kMostId + 1) {
-    return refuse("there is no id left for a landmark", error);
+    return refuse("no id is left for a new landmark", error);
   }
   return true;
 }

@@ -15,7 +15,7 @@
 
 #include "core/mapping/features.h"
 #include "core/mapping/lens_curve.h"
-#include "core/mapping/map_projection.h"
+#include "core/mapping/picture_motion.h"
 #include "core/model/angle.h"
 #include "core/model/mechanics.h"
 

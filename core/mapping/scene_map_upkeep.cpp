@@ -58,24 +58,28 @@ bool SceneMapUpkeepOptions::validate(const char** error) const {
   };
   if (!(lasting_s > 0)) return refuse("lasting_s must be positive");
   if (!(sigma_px > 0) || !(least_sigma_px >= 0) || !(gate_sigmas > 0) || !(wander_of_scale >= 0)) {
-    return refuse("sigmas, gate and wander must not be negative, sigma_px and gate_sigmas not 0");
+    return refuse(
+        "sigma_px and gate_sigmas must be positive, least_sigma_px and wander_of_scale not "
+        "negative");
   }
   if (!(forgetting >= 0) || !(forgetting <= 1)) return refuse("forgetting must be from 0 to 1");
   if (birth_views < 1 || !(least_proximity >= 0) || !(least_proximity <= 1) ||
       !(birth_gate_px > 0) || most_descriptor_step < 0 || most_candidates < 0) {
-    return refuse("a condition of birth is out of range");
+    return refuse(
+        "birth_views, least_proximity, birth_gate_px, most_descriptor_step or most_candidates is "
+        "out of range");
   }
   if (!(patience_s > 0) || !(longest_fog_s > 0) || least_misses < 1 || !(fog_share >= 0) ||
       !(fog_share <= 1)) {
-    return refuse("a condition of death is out of range");
+    return refuse("patience_s, longest_fog_s, least_misses or fog_share is out of range");
   }
   if (!(cell_scales > 0) || cell_capacity < 1 || most_landmarks < 1 ||
       most_landmarks > static_cast<int>(SceneMap::kMostLandmarks)) {
-    return refuse("a bound of the map is out of range");
+    return refuse("cell_scales, cell_capacity or most_landmarks is out of range");
   }
   if (!(least_scale_px > 0) || !(most_scale_px > least_scale_px) || !(most_zoom_ratio >= 1) ||
       !(border_px >= 0)) {
-    return refuse("what should be found is out of range");
+    return refuse("least_scale_px, most_scale_px, most_zoom_ratio or border_px is out of range");
   }
   return true;
 }

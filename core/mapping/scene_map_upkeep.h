@@ -2,9 +2,10 @@
 // SceneMapUpkeep: keeps a scene map up to date while it is used (Lisanti et al., section 3.3). It
 // is shown each picture whose pose was found from the map, and returns a change of the map:
 // landmarks that were seen (landmark_filter.h, descriptors by a running average), born or dead.
-// Bounded: cells of the sphere, of a size that goes with the landmark's, hold so many landmarks
-// each. In a full cell or map a new landmark replaces the least useful one if that is worth less.
-// The candidates kept beside the map are bounded, too; losing them at the end does no harm.
+// Bounded: the sphere is divided into cells, in proportion to the landmarks' size, and each cell
+// holds a limited number. In a full cell or map a new landmark replaces the least useful one if
+// that is worth less. The candidates kept beside the map are bounded, too; losing them at the end
+// does no harm.
 // Equal pictures give equal changes. Allocates; one thread at a time. Rules: docs/derivations.md.
 
 #include <cstdint>
@@ -24,7 +25,7 @@ struct SceneMapUpkeepOptions {
   double least_sigma_px = 0.03;
   double gate_sigmas = 4;
   double wander_of_scale = 0.01;  // of a landmark, in its sizes per day: leaves, shadows, warmth
-  double lasting_s = 600;         // > 0; a feature errs alike for so long, as the light lasts
+  double lasting_s = 600;         // > 0; how long a feature's error lasts, as the light does
   // Appearance
   double forgetting = 0.1;  // weight of a new descriptor
   // Birth

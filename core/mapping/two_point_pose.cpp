@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/mapping/map_projection.h"
+
 namespace alidade::internal {
 namespace {
 

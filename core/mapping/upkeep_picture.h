@@ -7,6 +7,7 @@
 #include <map>
 #include <vector>
 
+#include "core/mapping/map_projection.h"
 #include "core/mapping/scene_map_upkeep.h"
 
 namespace alidade {

@@ -20,7 +20,7 @@ namespace alidade {
 
 class ArrivalPace {
  public:
-  static constexpr double kBacklog_s = 0.1;  // longer waits are no jitter
+  static constexpr double kBacklog_s = 0.1;  // longer waits are not jitter
   static constexpr double kLeastHalf_s = 0.25;
 
   // The run of items that shows the pace, without the rest of a backlog.
@@ -93,10 +93,10 @@ class ArrivalPace {
   static constexpr std::size_t kLeastItems = 2;  // in a half
   static constexpr int kWindows = 6;             // up to 8 s
   // Tolerance: kSame_s, or 3 standard deviations of a half's minimum of n exponential delays: their
-  // mean above the minimum, divided by n. Waits of more than kBacklog_s are no delays.
+  // mean above the minimum, divided by n. Waits of more than kBacklog_s are not delays.
   // A steady fall by D between the halves has a mean of D / 2 above the minimum, so the tolerance
-  // is 3 D / (2 n): such a fall is no pace for any D beyond kSame_s. At the shortest window this is
-  // a backlog that is worked off 0.8 % faster than it grows.
+  // is 3 D / (2 n): such a fall does not count as a pace for any D beyond kSame_s. At the shortest
+  // window this is a backlog that is worked off 0.8 % faster than it grows.
   static constexpr double kSame_s = 2e-3;
   static constexpr double kNear_s = 5e-3;
   static constexpr double kOvertaken_s = 1;

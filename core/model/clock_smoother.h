@@ -85,7 +85,7 @@ class ClockSmoother {
 
  private:
   static constexpr std::size_t kSlots = 256;
-  static constexpr std::size_t kLeastItems = 32;  // of a window, if there are so many
+  static constexpr std::size_t kLeastItems = 32;  // of a window, if it has that many
   static constexpr int kIterations = 4;
   static constexpr double kNever = -1;
 

@@ -4,11 +4,9 @@
 // near zero (exponential, or similar close to its minimum). Priors: b uniform in [slope_min,
 // slope_max], h flat. Posterior:
 //   p(h, b) ~ exp(n (h + b mean(x)) / scale)   where   h + b x_i <= y_i for all i
-// Only the lower convex hull counts. The moments are sums of closed forms: no iteration, no
-// sampling. The mean lies below the mode (the highest line below all points) by scale / n and more,
-// which makes a young estimate honest.
-// No allocation, no exceptions; the caller lends the hull's memory. Any consistent units.
-// Derivation: docs/clocks.md.
+// Only the lower convex hull counts. The moments are sums of closed forms. The mean lies below the
+// mode (the highest line below all points), so a young estimate is honest. No allocation, no
+// exceptions; the caller lends the hull's memory. Any consistent units. Derivation: docs/clocks.md.
 
 #include <algorithm>
 #include <cmath>

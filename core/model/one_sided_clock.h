@@ -2,9 +2,8 @@
 // OneSidedClock: the line of a stream whose items are never early. Used by ClockFilter.
 // The line is the lower envelope of a sliding window. It contains the minimum delay. A step of that
 // (minimum_delay_step.h) beyond min_delay_step_s is subtracted from all later receive times: the
-// line continues, and its variance grows by the step's.
-// While a rise is suspected, late items do not count, as they would tilt a line whose rate is not
-// yet known. Before the lock the line follows a fall. If fewer than kLeastOnLine items have come
+// line continues, and its variance grows by the step's. While a rise is suspected, late items do
+// not count. Before the lock the line follows a fall. If fewer than kLeastOnLine items have come
 // down to the line before a rise, an early item had dragged it down: the line moves up instead, and
 // only items since the rise count.
 // Fixed memory, trivially copyable, no allocation, no exceptions. All times are host seconds.
@@ -34,7 +33,7 @@ class OneSidedClock {
     envelope_.start(prior);
   }
 
-  // Forgets the steps. The line answers no more until start().
+  // Forgets the steps. The line does not answer again until start().
   void restart() {
     shift_s_ = shift_variance_ = 0;
     locked_ = false;

@@ -102,7 +102,7 @@ class StampCount {
     part_ = Part();
   }
 
-  // A rise of more than kStall_s, after nothing was received for so long, is a stall: start anew.
+  // A rise of more than kStall_s, after as long without an item, is a stall: start anew.
   void end_part(double receive_s) {
     if (size_ > 0) {
       const double rise_s = part_.level_s - part(size_ - 1).level_s;

@@ -84,7 +84,7 @@ class SymmetricClock {
   [[nodiscard]] double without_line(double receive_s) const { return receive_s; }
   // s; standard deviation of the stamps' noise.
   [[nodiscard]] double jitter_s() const { return noise_s_; }
-  // 0: the walk of the skew is in the line's own variance.
+  // 0, as the line's own variance includes the walk of the skew.
   [[nodiscard]] double memory_s() const { return 0; }
   [[nodiscard]] double shift_s() const { return 0; }
   [[nodiscard]] double shift_variance() const { return 0; }

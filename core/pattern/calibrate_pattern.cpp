@@ -192,23 +192,23 @@ PatternCalibration calibrate_pattern(const PatternData& as_detected,
   const PatternViews views = internal::views_of(data);
   if (views.frames == 0) {
     return refused(result, PatternStatus::kNoPattern,
-                   "the pattern was found in no frame; is it this pattern, in view and lit?");
+                   "the pattern was not found in any frame; is it this pattern, in view and lit?");
   }
   if (views.frames < kLeastFrames) {
     return refused(result, PatternStatus::kTooFewFrames,
-                   formatted("the pattern was found in %.0f frames only; %.0f or more are needed",
+                   formatted("the pattern was found in only %.0f frames; at least %.0f are needed",
                              views.frames, kLeastFrames));
   }
   if (views.travel_px < kLeastTravel * data.height) {
-    return refused(result, PatternStatus::kNoLineDelay,
-                   formatted("the pattern stayed where it was in the image, within %.1f pixels; ",
-                             views.travel_px) +
-                       internal::how_to_move(views));
+    return refused(
+        result, PatternStatus::kNoLineDelay,
+        formatted("the pattern moved by only %.1f pixels in the image; ", views.travel_px) +
+            internal::how_to_move(views));
   }
   std::optional<LensVector> lens = internal::start_lens(data, knowledge);
   if (!lens) {
     return refused(result, PatternStatus::kNoStart,
-                   "the views give no focal length; " + internal::how_to_show(views));
+                   "the views do not determine the focal length; " + internal::how_to_show(views));
   }
   if (!knowledge.fixed[static_cast<std::size_t>(index(LensParameter::kLineDelay))]) {
     (*lens)[index(LensParameter::kLineDelay)] = options.start_line_delay_s;
@@ -217,7 +217,7 @@ PatternCalibration calibrate_pattern(const PatternData& as_detected,
   if (poses.size() < kLeastFrames) {
     return refused(
         result, PatternStatus::kNotConverged,
-        "no pose of the camera fits the detections; are the pattern's rows and columns as told?");
+        "no pose of the camera fits the detections; are the pattern's rows and columns right?");
   }
   PatternState state;
   state.lens = *lens;
@@ -257,9 +257,9 @@ PatternCalibration calibrate_pattern(const PatternData& as_detected,
     }
     const double times = state.lens[0] / first_focal_length_px;
     if (!(times < kRunOff && times > 1 / kRunOff)) {
-      return refused(
-          result, PatternStatus::kNoLens,
-          "the views are too much alike for a focal length; " + internal::how_to_show(views));
+      return refused(result, PatternStatus::kNoLens,
+                     "the views are too similar to determine the focal length; " +
+                         internal::how_to_show(views));
     }
     sigma_px = leave_out_wrong(data, state, &used);
     if (result.rounds == 0) expect_accelerations(state.curve, &adjustment);
@@ -311,7 +311,7 @@ PatternCalibration calibrate_pattern(const PatternData& as_detected,
       2.0 * result.observations - 6.0 * state.curve.control_points() - kLensParameterCount;
   if (freedom < result.observations / 4.0) {
     return refused(result, PatternStatus::kTooFewFrames,
-                   "too few points a frame for the motion; show more of the pattern");
+                   "too few points in each frame to follow the motion; show more of the pattern");
   }
   result.sigma_px = std::sqrt(sum / freedom);
 
@@ -326,10 +326,11 @@ PatternCalibration calibrate_pattern(const PatternData& as_detected,
   result.covariance = covariance->independent;
   // Checked first: with an undetermined lens the rest of the result means nothing.
   if (!(focal_length_sigma(result) <= options.largest_focal_length_sigma)) {
-    return refused(result, PatternStatus::kNoLens,
-                   formatted("focal length known to %.1f %% only: the views are too much alike; ",
-                             100 * focal_length_sigma(result)) +
-                       internal::how_to_show(views));
+    return refused(
+        result, PatternStatus::kNoLens,
+        formatted("the focal length is known to %.1f %% only: the views are too similar; ",
+                  100 * focal_length_sigma(result)) +
+            internal::how_to_show(views));
   }
   result.covariance = covariance->covariance();
   const double missed = missed_motion(score);
@@ -338,34 +339,34 @@ PatternCalibration calibrate_pattern(const PatternData& as_detected,
     return refused(
         result, PatternStatus::kFrameRateTooLow,
         formatted("the camera moved too fast for %.1f frames a second: move it at %.0f %% of this "
-                  "speed or less; or the pattern is not flat, or not as long and high as told",
+                  "speed or less; if it was slow, is the pattern flat, and of the given size?",
                   1 / result.frame_interval_s, followed_speed(missed)));
   }
   if (!(focal_length_sigma(result) <= options.largest_focal_length_sigma)) {
     return refused(
         result, PatternStatus::kNoLens,
-        formatted("focal length known to %.1f %% only, since the pattern's points do not "
-                  "lie where they should; is it flat, and as long and high as told?",
+        formatted("the focal length is known to %.1f %% only, as the pattern's points do not "
+                  "lie where they should; is it flat, and of the given size?",
                   100 * focal_length_sigma(result)));
   }
   const double line_delay_sigma_s = result.sigma(LensParameter::kLineDelay);
   if (!(line_delay_sigma_s * data.height <= options.largest_readout_sigma_s)) {
     return refused(result, PatternStatus::kNoLineDelay,
-                   formatted("the image hardly moved while it was read out: line delay known to "
-                             "%.2g us only; ",
+                   formatted("the image hardly moved while it was read out, so the line delay is "
+                             "known to %.2g us only; ",
                              1e6 * line_delay_sigma_s) +
                        internal::how_to_move(views));
   }
   if (missed > 1) {
     result.remarks.push_back(formatted(
-        "the camera moved almost too fast for %.1f frames a second: sigmas are %.1f times larger "
-        "for it",
+        "the camera moved almost too fast for %.1f frames a second, so sigmas are %.1f times "
+        "larger",
         1 / result.frame_interval_s, missed));
   }
   if (line_delay_sigma_s > 0 && result.has_global_shutter()) {
-    result.remarks.push_back(
-        formatted("no line delay, within %.2g us: all rows are exposed at once (a global shutter)",
-                  3e6 * line_delay_sigma_s));
+    result.remarks.push_back(formatted(
+        "the line delay is 0 within %.2g us: all rows are exposed at once (a global shutter)",
+        3e6 * line_delay_sigma_s));
   }
   result.status = PatternStatus::kOk;
   return result;

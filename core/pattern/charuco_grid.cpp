@@ -103,18 +103,19 @@ std::string CharucoGrid::doubt() const {
   };
   const std::string mine = name(pattern_.dictionary);
   if (layout_.is_undecided()) {
-    return "the part of the board that is seen may be of one drawn by OpenCV of today or of before "
-           "4.6; show it whole once";
+    return "the visible part of the board fits boards of OpenCV before 4.6 and later ones; show "
+           "the whole "
+           "board once";
   }
   if (layout_.images_with_markers() > 0) {
     return "markers of dictionary " + mine + " are seen in " +
            std::to_string(layout_.images_with_markers()) +
-           " images, but do not lie as on this board; check its counts, which are of squares, and "
+           " images, but not where this board has them; check its counts (they count squares) and "
            "the sides of its squares and markers";
   }
   if (const std::optional<int> other = layout_.other_dictionary()) {
-    return "no markers of dictionary " + mine + " are seen, but some of " + name(*other) +
-           "; is it the board's dictionary? An AprilGrid, too, has markers, of apriltag_36h11";
+    return "markers of dictionary " + name(*other) + " are seen, but none of " + mine +
+           "; what is the board's dictionary? An AprilGrid also has markers, of apriltag_36h11";
   }
   return "no markers of dictionary " + mine + " are seen in any image";
 }

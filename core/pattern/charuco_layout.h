@@ -1,7 +1,7 @@
 #pragma once
 // CharucoLayout: which squares of a ChArUco board hold which markers, and which markers found in an
-// image belong to the board. A marker counts if it and its neighbours lie where each predicts the
-// other, which wrongly read ones do not.
+// image belong to the board. A marker counts if it and its neighbours predict each other's places;
+// wrongly read markers do not.
 // Before OpenCV 4.6 a board with an even number of rows had its colours, and so its markers, the
 // other way round. The majority of neighbours in the images so far decides. Until then no marker
 // counts, as a part of a board may fit both layouts. One thread at a time.
@@ -51,7 +51,7 @@ class CharucoLayout {
   [[nodiscard]] int agreement(const Marker& a, const Marker& b, std::size_t layout) const;
 
   KnownPattern pattern_;
-  std::array<std::vector<cv::Point2d>, 2> middles_;  // as of OpenCV 4.6, and before
+  std::array<std::vector<cv::Point2d>, 2> middles_;  // from OpenCV 4.6 on, and before
   std::array<int, 2> votes_ = {};
   std::size_t chosen_ = 0;
   int images_with_markers_ = 0;

@@ -83,14 +83,15 @@ std::string read_markers(const std::vector<std::string>& parts, KnownPattern* pa
   if (!marker) return "'" + parts[3] + "' is not a marker's length with its unit, mm, cm, m or in";
   if (!(*marker > 0 && *marker < pattern->size_m)) {
     return "a marker of " + parts[3] + " does not fit into a square of " + parts[2] +
-           "; the square comes first, the marker has some 0.75 of it";
+           "; give the square first, then the marker, about 0.75 of it";
   }
   pattern->marker_m = *marker;
   if (parts.size() > 4) {
     const std::optional<int> dictionary = dictionary_of(parts[4]);
     if (!dictionary) {
       return "'" + parts[4] +
-             "' is no dictionary; known are 4x4_50, _100, _250, _1000, the same with 5x5, 6x6 and "
+             "' is not a known dictionary; known are 4x4_50, _100, _250, _1000, the same with 5x5, "
+             "6x6 and "
              "7x7, aruco_original, apriltag_16h5, _25h9, _36h10 and _36h11";
     }
     pattern->dictionary = *dictionary;
@@ -98,9 +99,9 @@ std::string read_markers(const std::vector<std::string>& parts, KnownPattern* pa
   const MarkerDictionary& dictionary =
       kMarkerDictionaries[static_cast<std::size_t>(pattern->dictionary)];
   if (pattern->markers() > dictionary.markers) {
-    return "the board has " + std::to_string(pattern->markers()) + " markers, dictionary " +
-           dictionary.name + " only " + std::to_string(dictionary.markers) +
-           "; name the one that it was printed with";
+    return "the board has " + std::to_string(pattern->markers()) + " markers, but dictionary " +
+           dictionary.name + " has only " + std::to_string(dictionary.markers) +
+           "; name the dictionary that it was printed with";
   }
   return "";
 }
@@ -157,7 +158,7 @@ std::optional<KnownPattern> parse_pattern(const std::string& text, std::string* 
     *error = "'" + text + "': " + what + "; expected " + kExamples;
     return std::nullopt;
   };
-  if (parts.empty()) return wrong("no pattern");
+  if (parts.empty()) return wrong("no pattern is given");
   KnownPattern pattern;
   bool known = false;
   for (const NamedKind& named : kKinds) {
@@ -165,19 +166,20 @@ std::optional<KnownPattern> parse_pattern(const std::string& text, std::string* 
     pattern.kind = named.kind;
     known = true;
   }
-  if (!known) return wrong("'" + parts[0] + "' is no kind of pattern");
+  if (!known) return wrong("'" + parts[0] + "' is not a kind of pattern");
   const bool grid = pattern.kind == PatternKind::kAprilGrid;
   const bool charuco = pattern.kind == PatternKind::kCharuco;
   if (charuco && !internal::has_aruco()) {
     *error = "'" + text +
-             "': this build of alidade has no ChArUco boards; they need Debian's package "
-             "libopencv-contrib-dev when it is built";
+             "': this build of alidade cannot find ChArUco boards; build it with Debian's package "
+             "libopencv-contrib-dev installed";
     return std::nullopt;
   }
   if (charuco && parts.size() != 4 && parts.size() != 5)
-    return wrong("kind, counts, square, marker and perhaps a dictionary make it");
+    return wrong("it needs kind, counts, square, marker and optionally a dictionary");
   if (!charuco && parts.size() != (grid ? 4U : 3U))
-    return wrong(grid ? "kind, counts, length and gap make it" : "kind, counts and length make it");
+    return wrong(grid ? "it needs kind, counts, length and gap"
+                      : "it needs kind, counts and length");
   if (!counts_of(parts[1], &pattern.columns, &pattern.rows))
     return wrong("'" + parts[1] + "' is not COLUMNSxROWS");
   const int least = grid ? 1 : 3;
@@ -185,7 +187,7 @@ std::optional<KnownPattern> parse_pattern(const std::string& text, std::string* 
       pattern.rows > 100) {
     return wrong("'" + parts[1] + "' is out of range, " + std::to_string(least) + " to 100");
   }
-  if (grid && pattern.columns * pattern.rows > 587) return wrong("the family has 587 tags");
+  if (grid && pattern.columns * pattern.rows > 587) return wrong("its family has only 587 tags");
   const std::optional<double> size = length_of(parts[2]);
   if (!size) return wrong("'" + parts[2] + "' is not a length with its unit, mm, cm, m or in");
   if (!(*size >= 1e-4 && *size <= 10))
@@ -199,7 +201,8 @@ std::optional<KnownPattern> parse_pattern(const std::string& text, std::string* 
     std::string rest;
     const std::optional<double> gap = leading_number(parts[3], &rest);
     if (!gap || !rest.empty() || !(*gap > 0 && *gap <= 2))
-      return wrong("'" + parts[3] + "' is not a gap as a part of a tag's side, 0 to 2");
+      return wrong("'" + parts[3] +
+                   "' is not a gap in parts of a tag's side, above 0 and at most 2");
     pattern.gap = *gap;
   }
   return pattern;

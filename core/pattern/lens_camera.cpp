@@ -121,8 +121,11 @@ std::optional<Fit> fit_lens(const LensVector& lens, int width, int height,
   *grid = grid_over(lens, width, height);
   if (grid->size() < static_cast<std::size_t>(kColumns * kRows)) return std::nullopt;
   const double f = lens[index(LensParameter::kFocalLengthU)];
-  return fit(*grid, {f, lens[index(LensParameter::kFocalLengthV)] / f,
-                     {lens[index(LensParameter::kK1)]}, width, height});
+  return fit(*grid, {f,
+                     lens[index(LensParameter::kFocalLengthV)] / f,
+                     {lens[index(LensParameter::kK1)]},
+                     width,
+                     height});
 }
 
 // Step of a parameter for its numeric derivative: a small change in the image.

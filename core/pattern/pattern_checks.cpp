@@ -17,7 +17,7 @@ using Box = Eigen::AlignedBox2d;
 
 std::string nearer(const PatternViews& views) {
   if (views.extent >= kSmallExtent) return "";
-  return formatted("go nearer, the pattern fills %.0f %% of the image's width only, and ",
+  return formatted("go nearer, as the pattern fills only %.0f %% of the image's width, and ",
                    100 * views.extent);
 }
 
@@ -31,7 +31,8 @@ std::string formatted(const char* format, double a, double b) {
 
 std::optional<std::string> bad_input(const PatternData& data) {
   if (data.width <= 0 || data.height <= 0)
-    return formatted("an image of %.0f x %.0f pixels", data.width, data.height);
+    return formatted("the image has %.0f x %.0f pixels; both must be above 0", data.width,
+                     data.height);
   for (const auto& p : data.points_m) {
     if (!all_finite(p)) return "a point of the pattern is not a finite number";
   }
@@ -42,17 +43,15 @@ std::optional<std::string> bad_input(const PatternData& data) {
       return formatted("frame %.0f: its time is not a finite number", number);
     if (f > 0 && frame.time_s <= data.frames[f - 1].time_s) {
       return formatted(frame.time_s == data.frames[f - 1].time_s
-                           ? "frame %.0f: the time stamp of the one before, %.6f s, again; leave "
-                             "repeated frames "
-                             "out"
-                           : "frame %.0f: its time stamp, %.6f s, lies before the last one's; "
+                           ? "frame %.0f: it repeats the time stamp of the frame before, %.6f s; "
+                             "leave repeated frames out"
+                           : "frame %.0f: its time stamp, %.6f s, is earlier than the one before; "
                              "times must increase",
                        number, frame.time_s);
     }
     for (const PatternObservation& observation : frame.observations) {
       if (observation.point < 0 || observation.point >= static_cast<int>(data.points_m.size())) {
-        return formatted("frame %.0f: point %.0f is none of the pattern's", number,
-                         observation.point);
+        return formatted("frame %.0f: the pattern has no point %.0f", number, observation.point);
       }
       if (!all_finite(observation.u))
         return formatted("frame %.0f: a detection is not a finite number", number);

@@ -57,15 +57,14 @@ std::vector<std::string> doubts_of(const PatternData& data) {
   }
   if (jumps >= kFewestJumps) {
     doubts.push_back(internal::formatted(
-        "the pattern jumps through the image %.0f times from one frame to the next; is there a "
-        "second one in view? Cover it; or move by less than %.0f %% of the pattern's diagonal a "
-        "frame",
+        "the pattern jumps %.0f times from one frame to the next; is a second one in view? Cover "
+        "it. If not, move by less than %.0f %% of the pattern's diagonal a frame",
         jumps, 100 * kJump));
   }
   if (twice >= kFewestJumps) {
     doubts.push_back(internal::formatted(
-        "parts of the pattern are seen twice in %.0f images; is there a second one in view? "
-        "Cover it",
+        "parts of the pattern are seen twice in %.0f images; is a second one in view? Cover "
+        "it",
         twice));
   }
   return doubts;

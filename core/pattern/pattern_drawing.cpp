@@ -191,7 +191,7 @@ std::optional<std::string> draw_pattern(const KnownPattern& pattern, const std::
   const auto* found =
       std::find_if(kPapers.begin(), kPapers.end(), [&](const Paper& p) { return paper == p.name; });
   if (found == kPapers.end()) {
-    *error = "'" + paper + "' is no paper; expected a4, a3, a2, a1, a0 or letter";
+    *error = "'" + paper + "' is not a known paper; expected a4, a3, a2, a1, a0 or letter";
     return std::nullopt;
   }
   const Paper& sheet = *found;

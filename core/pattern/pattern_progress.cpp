@@ -190,15 +190,16 @@ std::string listed(const std::array<double, count>& values, double mark,
 std::vector<std::string> still_to_show(const PatternProgress& progress) {
   std::vector<std::string> lines;
   if (progress.extent < internal::kSmallExtent)
-    lines.emplace_back("go nearer, the pattern is small in the image");
+    lines.emplace_back("go nearer: the pattern is small in the image");
   const std::string places = listed<9>(progress.covered, kCovered,
                                        {"upper left", "top", "upper right", "left", "middle",
                                         "right", "lower left", "bottom", "lower right"});
   if (!places.empty()) lines.push_back("show it in these parts of the image: " + places);
   const std::string sides = listed<4>(progress.tilt, kTilt, {"left", "right", "upper", "lower"});
-  if (!sides.empty()) lines.push_back("tilt it by 30 to 45 degrees, nearer by its side: " + sides);
+  if (!sides.empty())
+    lines.push_back("tilt it by 30 to 45 degrees, with each of these sides nearer: " + sides);
   if (progress.distance_ratio < kDistanceRatio)
-    lines.emplace_back("show it nearer and farther, all distances are alike");
+    lines.emplace_back("show it nearer and farther: all distances are alike");
   if (progress.speed < kSpeed) lines.emplace_back(internal::kMoveFaster);
   return lines;
 }
@@ -237,19 +238,18 @@ std::vector<std::string> advice_of(const PatternProgress& progress) {
     lines.push_back(
         (progress.extent == 0
              ? "the pattern is not found"
-             : internal::formatted("the pattern is not found since %.0f s", progress.last_seen_s)) +
+             : internal::formatted("the pattern was last found at %.0f s", progress.last_seen_s)) +
         "; is it this pattern, whole in view, in focus and lit?");
   } else if (progress.found < kSeldom) {
     lines.push_back(
         internal::formatted("the pattern is found in few images, %.0f %% of them; move half as "
-                            "fast, or give more light "
-                            "and keep it in view",
+                            "fast, or give more light and keep it in view",
                             10 * std::round(10 * progress.found)));
   } else if (progress.unfollowed > kUnfollowed) {
     // The error of a cubic through the frames around grows with the fourth power of the speed.
     // Rounded to tens, so that the line changes only when the speed has.
     lines.push_back(internal::formatted(
-        "move at %.0f %% of this speed or less, the image moves too far from one frame to the next",
+        "move at %.0f %% of this speed or less: the image moves too far from one frame to the next",
         10 * std::max(1.0, std::floor(10 * std::pow(kUnfollowed / progress.unfollowed, 0.25)))));
   }
   // Other advice is of no use before the pattern was seen at all.

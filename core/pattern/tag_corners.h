@@ -24,7 +24,7 @@ struct TagFace {
 // Which of a tag's corners are touched from outside by one of kalibr's black squares.
 using CornerSquares = std::array<bool, 4>;
 
-// Corners of a tag with so many cells a side: lower left, lower right, upper right, upper left.
+// Corners of a tag with this many cells a side: lower left, lower right, upper right, upper left.
 [[nodiscard]] std::vector<cv::Point2f> tag_square(int side);
 
 // corners: OpenCV's pixels, in that order; about a pixel off at first. gap: to the next tag, equal

@@ -89,14 +89,13 @@ std::string TagSpacing::doubt() const {
                ? "its tags are numbered from the top downwards; expected a grid whose first tag is "
                  "the lower left one, as --print draws it"
                : formatted(
-                     "its tags lie in rows of %.0f, not of %.0f as it was named; the tags of "
-                     "a row come first, then the rows",
+                     "its tags lie in rows of %.0f, but %.0f were given; give the tags of a row "
+                     "first, then the rows",
                      most.first, pattern_.columns);
   }
   if (gap_ == pattern_.gap) return "";
-  return formatted(
-             "the gap between its tags is %.2f of a tag's side, not %.4g as it was named; is it ",
-             gap_, pattern_.gap) +
+  return formatted("the gap between its tags is %.2f of a tag's side, but %.4g was given; is it ",
+                   gap_, pattern_.gap) +
          "aprilgrid:" + std::to_string(pattern_.columns) + "x" + std::to_string(pattern_.rows) +
          formatted(":%.6gmm:%.2f?", 1000 * pattern_.size_m, gap_);
 }

@@ -1,7 +1,7 @@
 #pragma once
-// TagSpacing: measures the grid in which tags are printed, whatever it is named: the gap between
-// tags, by the cross ratio of the four corners on a line of edges, and the order of their numbers.
-// Independent of times and lens.
+// TagSpacing: measures the grid in which tags are printed, independently of its name: the gap
+// between tags, by the cross ratio of the four corners on a line of edges, and the order of their
+// numbers. Independent of times and lens.
 
 #include <map>
 #include <opencv2/core.hpp>

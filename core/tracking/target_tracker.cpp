@@ -47,8 +47,9 @@ bool TargetTrackerOptions::validate(const char** error) const {
   const auto probability = [](double p) { return p > 0 && p < 1; };
   if (!positive(acceleration_density)) problem = "acceleration_density must be positive";
   if (!positive(sigma_first_velocity)) problem = "sigma_first_velocity must be positive";
-  if (!probability(detection_probability)) problem = "detection_probability must be in (0, 1)";
-  if (!probability(gate_probability)) problem = "gate_probability must be in (0, 1)";
+  if (!probability(detection_probability))
+    problem = "detection_probability must be above 0 and below 1";
+  if (!probability(gate_probability)) problem = "gate_probability must be above 0 and below 1";
   if (birth_hits < 1 || birth_looks < birth_hits) {
     problem = "birth_hits must be at least 1 and at most birth_looks";
   }

@@ -4,7 +4,7 @@
 //   lateness  of an item: receive time minus the filter's final line at the item's sender time or
 //             count
 //   raw rate  host seconds per sender second: the median slope over half of the stream, without the
-//             filter's prior. It reveals stamps that are no clock; the filter, which assumes
+//             filter's prior. It reveals stamps that are not a clock's; the filter, which assumes
 //             quartz, does not.
 // Seconds. Pure functions; they allocate and do not throw, whatever the stamps hold.
 
@@ -34,7 +34,7 @@ struct ClockReport {
   // The same rate without the filter's prior, with its standard deviation: shows a broken clock.
   std::optional<double> raw_rate_error;
   double raw_rate_sigma = 0;
-  // False: the stamps are no times (see judge_clock()), and the items' times are their arrivals.
+  // False: the stamps are not times (see judge_clock()), and the items' times are their arrivals.
   bool usable = true;
   bool counts = false;  // not usable because they count items
 };
@@ -53,8 +53,8 @@ struct ClockedStamp {
                                       const ClockFilterOptions& options,
                                       std::vector<double>* time_s = nullptr);
 
-// `what`: "video URL". A clock that is none, or jumps, is a problem. A step of the least delay is
-// advice.
+// `what`: "video URL". Stamps that are not a clock's, or that jump, are a problem. A step of the
+// least delay is advice.
 void judge_clock(const ClockReport& clock, const std::string& what, Findings* findings);
 
 // In words; empty if the stamps are times, or there are none.

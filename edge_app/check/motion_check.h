@@ -3,7 +3,7 @@
 // signs, and which focal length and clock offset fit. The clock offset is the one that explains
 // most of the image's motion (motion_fit.h). A sign is stated only if the axis moved the image by 2
 // px rms over 0.3 s (the tracker errs by a tenth of that) in eight baselines or more, if this sign
-// explains at least 80 % of that motion, and if no offset explains 4/5 of that with the other sign.
+// explains at least 80 % of that motion, and if with the other sign no offset explains 4/5 as much.
 // Reasons and the other rules: docs/derivations.md.
 // Good to some percent. Radians, seconds, px. Pure; allocates.
 

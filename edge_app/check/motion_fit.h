@@ -68,7 +68,7 @@ struct MotionFit {
 // whichever fits.
 [[nodiscard]] double explained(const MotionFit& fit, const std::array<int, 2>& signs);
 // The same with each axis of the image against the other axis of the head, as for an image turned
-// by a quarter.
+// by 90 degrees.
 [[nodiscard]] double crossed(const MotionFit& fit);
 
 // Fits at clock offsets around a given one: a second to both sides, then twice as far each time, as

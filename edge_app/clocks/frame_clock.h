@@ -1,13 +1,11 @@
 #pragma once
 // FrameClock: the capture time of each frame of a live stream, and whether that time is known.
-//
 // A frame may have waited for an unknown time before it arrived and was stamped: behind a relay or
 // a network that stood still, in a cache, or in the socket of this process. Its time comes from the
 // sender's clock, else from the sequence numbers, else from arrivals alone (receipt_clock.h,
 // uneven_arrivals.h). Time stamps that run at a wrong rate, or count pictures, are left out.
-// Derivation: docs/derivations.md.
-// wait_for_pace false (the receive times are no arrivals, or a recording is read as a source):
-// CaptureClock alone.
+// wait_for_pace false (receive times that are not arrivals, or a recording read as a source):
+// CaptureClock alone. Derivation: docs/derivations.md.
 // Seconds. Fixed memory, no allocation, one thread.
 
 #include <algorithm>
@@ -32,7 +30,7 @@ namespace alidade {
 struct FrameTime {
   ClockEstimate clock;
   bool known = true;   // false: clock.time_s may be late by any amount
-  bool of_use = true;  // false: it will not be known later either, when the pace or the line is
+  bool of_use = true;  // false: it stays unknown even when the pace or the line is known
   // Sum of the steps of the least delay. The receive time contains it, the line does not.
   double delay_shift_s = 0;
   // By how much frames leave the line. Included in clock.sigma_s; common to neighbouring frames.

@@ -1,14 +1,11 @@
 #pragma once
 // UnevenArrivals: the capture times of a live stream of which only arrivals are known and whose
-// camera leaves pictures out, now and then or often. So its pictures are no measure of time, as
+// camera leaves pictures out, now and then or often. So its pictures do not measure time, as
 // receipt_clock.h assumes.
-//
 // A picture that comes after more than the usual interval has waited for the excess at most, or
 // came behind a missing one. Its time is the middle of what is possible, and sigma covers it.
-// Pictures that waited behind it follow at once, each less late by the time made up. A picture at
-// the usual interval, or later, follows one that had not waited. Ages beyond kLongest_s are
-// unknown, as are those at a connection's beginning until kPunctual pictures in a row came at the
-// usual interval.
+// Ages beyond kLongest_s are unknown, as are those at a connection's beginning. What the next
+// pictures show: docs/derivations.md.
 // Seconds of the host's clock. Fixed memory, no allocation, one thread.
 
 #include <algorithm>

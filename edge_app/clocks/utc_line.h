@@ -4,11 +4,9 @@
 // reports). Beyond PTCEE.
 //   before   host time = line(sender), sender = utc - ahead     as last seen on the old connection
 //   after    time = line(utc - ahead), late = receive - time
-// An absolute clock may be set meanwhile, and reports may be nonsense. So only an age near zero, to
-// kAgrees_s, is trusted: then two clocks agree, as a picture as old as a clock step would be a
-// coincidence. Sigma includes `late`, the line's and the delays' own. `ahead` is used once it held
-// to kSteady_s for kProven_s; a change forgets what was kept. The line is used if it was locked and
-// is still known to kSharp_s, which does not last for hours.
+// Only an age near zero, to kAgrees_s, is trusted, as an absolute clock may be set and reports may
+// be nonsense. Sigma includes `late`, the line's and the delays' own. When line and `ahead` are
+// used: docs/derivations.md.
 // Seconds. Fixed memory, no allocation, one thread.
 
 #include <cmath>
@@ -75,7 +73,7 @@ class UtcLine {
 
  private:
   static constexpr double kSteady_s = 5e-3;
-  // A rate that is off by more than 5e-4 does not hold for so long.
+  // A rate that is off by more than 5e-4 does not hold for this long.
   static constexpr double kProven_s = 10;
   static constexpr double kSharp_s = 5e-3;
 

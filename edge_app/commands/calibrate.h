@@ -25,7 +25,7 @@ struct CalibrateOptions {
   std::optional<double> scale_sigma;
 };
 
-// Calibrates from one recording, or from all of them together where the zoom differs. Returns the
+// Calibrates from one recording, or from all of them together if they differ in zoom. Returns the
 // exit code; throws CommandError.
 [[nodiscard]] int calibrate_recordings(const CalibrateOptions& options);
 

@@ -21,7 +21,7 @@ namespace alidade {
 inline constexpr double kStart_s = 2;
 
 struct Connection {
-  std::string error;  // why nothing, or nothing more, came; empty: none
+  std::string error;  // why no item, or no further item, came; empty: no error
   int losses = 0;     // after the first item
   std::string loss;   // error text of the last loss
   // What the connected source waited for last before its first item; empty: nothing.

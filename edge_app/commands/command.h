@@ -44,7 +44,7 @@ PublishedCalibration choose_calibration(const Config& config);
 std::shared_ptr<const PlaneEstimate> require_plane(const Config& config);
 
 // A camera that is known only from its data sheet: nominal axes, no offsets, and standard
-// deviations that are large enough for that.
+// deviations large enough to allow for the real ones.
 Calibration data_sheet_calibration(const CameraConfig& camera);
 
 // With the noise that the configuration, or the noise.yaml of a recording, states.

@@ -14,8 +14,8 @@
 namespace alidade {
 
 // Returns all values with `wanted` set. remarks: gets lines about the file for the user. Throws
-// CommandError if the file cannot be read or is no lens.yaml, if the shape of the images differs,
-// or if the base camera cannot represent the lens.
+// CommandError if the file cannot be read or is not a lens.yaml, if the shape of the images
+// differs, or if the base camera cannot represent the lens.
 [[nodiscard]] KnownCamera load_lens_prior(const std::string& path, int width, int height,
                                           std::vector<std::string>* remarks);
 

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/calibration/number_text.h"
+#include "core/mapping/map_projection.h"
 #include "core/model/trigonometry.h"
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/output_directory.h"

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/calibration/number_text.h"
+#include "core/mapping/map_projection.h"
 #include "core/model/median.h"
 #include "core/model/trigonometry.h"
 

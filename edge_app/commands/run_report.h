@@ -18,8 +18,8 @@ namespace alidade {
                                    const ZoomCurve& curve);
 
 // Reports to a service manager once a period: the state and, as long as records get through the
-// threads, that the process is alive. A missing camera is no reason to be killed. A thread that
-// hangs is.
+// threads, that the process is alive. A missing camera does not get the process killed; a thread
+// that hangs does.
 class LifeReport {
  public:
   // Both must outlive this object.

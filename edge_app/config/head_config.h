@@ -18,7 +18,7 @@ struct HeadConfig {
 };
 
 // The keys pan_positive, pan_zero_deg, tilt_positive and tilt_zero_deg. pan_positive and
-// tilt_positive are required where `usual` has no sign. Throws ConfigError.
+// tilt_positive are required if `usual` has no sign. Throws ConfigError.
 struct AxisMappings {
   AxisMapping pan;
   AxisMapping tilt;

@@ -4,7 +4,7 @@
 //   change = localized angle - record's angle, at the row for which the map's pose holds
 // A record in telemetry's base is expected within zero_sigma of the map's base; one in the map's
 // base within its own sigma. A larger change is a movement once a second picture confirms it. A
-// movement is either corrected, so that what was known no longer counts, or only reported. Pure: no
+// movement is either corrected, and earlier results no longer count, or only reported. Pure: no
 // thread, no clock. Allocates nothing.
 
 #include <optional>
@@ -32,8 +32,8 @@ class BaseJudge {
 
   explicit BaseJudge(const BaseJudgeOptions& options = {}) : options_(options) {}
 
-  // found: kOk, of the record's frame, which has an orientation. *told: sets all but frame and
-  // time_s.
+  // found: a result with kOk for the record's frame, which has an orientation. Sets all of *told
+  // except frame and time_s.
   [[nodiscard]] Verdict judge(const OrientationRecord& record, const Localization& found,
                               double reference_row, ToldBase* told, BaseOffset* offset);
 

@@ -256,12 +256,8 @@ ServerResponse targets(const HttpApiSources& sources, const ServerRequest& reque
   if (sources.targets == nullptr) return http_error(404, kNothingTracked);
   const TargetFeed::Snapshot snapshot = sources.targets->snapshot();
   const auto& state = snapshot.newest;
-  Json out{{"frame", nullptr},
-           {"time_s", nullptr},
-           {"detected_frame", nullptr},
-           {"space",
-            sources.targets->options().tracker.space == TargetSpace::kPlane ? "plane" : "sphere"},
-           {"targets", Json::array()}};
+  TargetList list;
+  list.space = sources.targets->options().tracker.space;
   const auto wanted = request.parameter("frame");
   OrientationRecord record;
   if (wanted) {
@@ -274,7 +270,8 @@ ServerResponse targets(const HttpApiSources& sources, const ServerRequest& reque
   } else if (state) {
     record = state->record;
   }
-  if (state) out = targets_json(*state, record);
+  if (state) list = list_targets(*state, record);
+  Json out = targets_json(list);
   out["detections"] = target_counters_json(snapshot.counters);
   out["detections"]["waiting"] = snapshot.waiting;
   return json_response(out);

@@ -26,7 +26,7 @@ namespace alidade {
 
 struct LiveStateOptions {
   double kept_s = 10;           // s of time_s; how long records with a frame are kept
-  std::size_t max_kept = 2048;  // at most so many of them
+  std::size_t max_kept = 2048;  // at most this many of them
   std::size_t max_lines = 512;  // that a reader may be behind
   double history_s = 60;
   double history_step_s = 0.1;

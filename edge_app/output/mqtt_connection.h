@@ -3,8 +3,8 @@
 // 3.1.1). Each attempt is a new object. So nothing of an old connection is sent over a new one, and
 // what a broker retains is never overwritten by something older. For one thread, which waits until
 // socket() is ready and then calls step(). If a name has several addresses, the first that does not
-// refuse at once is taken. The library looks up names in a call that blocks: that is the owner's
-// errand.
+// refuse at once is taken. The library looks up names in a call that blocks, so the owner's Errand
+// makes it.
 
 #include <functional>
 #include <memory>

@@ -35,7 +35,7 @@ class SvgPlot {
   void arrow(const PlotPoint& from, const PlotPoint& to);
   // A grey band from `low` to `high` over the whole width.
   void band(double low, double high);
-  // Shades `from` to `to` over the whole height, where there are no data.
+  // Shades `from` to `to`, which have no data, over the whole height.
   void shade(double from, double to);
   void level(double y);
   void rectangle(const PlotPoint& from, const PlotPoint& to, const char* colour, double opacity);

@@ -5,10 +5,10 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
+#include <vector>
 
-#include "edge_app/output/or_null.h"
-#include "edge_app/tracking/frame_view.h"
 #include "edge_app/tracking/target_fields.h"
+#include "edge_app/tracking/target_list_fields.h"
 
 namespace alidade {
 namespace {
@@ -39,7 +39,7 @@ Json json_of(const std::optional<T>& value) {
   return value ? json_of(*value) : Json();
 }
 
-// What target_fields.h writes to.
+// What target_fields.h and target_list_fields.h write to.
 class TargetJson {
  public:
   template <class T>
@@ -55,33 +55,31 @@ class TargetJson {
     Json& object = json_[name];
     for (std::size_t i = 0; values && i < kSize; ++i) object[keys[i]] = (*values)[i];
   }
+  void add_targets(const char* name, const std::vector<TargetReport>& targets, TargetSpace space) {
+    Json& array = json_[name] = Json::array();
+    for (const TargetReport& target : targets) {
+      TargetJson one;
+      add_fields(target, space, &one);
+      array.push_back(one.take());
+    }
+  }
   [[nodiscard]] Json take() { return std::move(json_); }
 
  private:
   Json json_ = Json::object();
 };
 
-Json target_json(const TargetReport& target, TargetSpace space) {
+}  // namespace
+
+Json targets_json(const TargetList& list) {
   TargetJson json;
-  add_fields(target, space, &json);
+  add_fields(list, &json);
   return json.take();
 }
 
-}  // namespace
-
-Json targets_json(const TargetsState& state, const OrientationRecord& record) {
-  Json targets = Json::array();
-  for (const TargetReport& target : report_targets(state, record))
-    targets.push_back(target_json(target, state.space));
-  return {{"frame", or_null(record.frame)},
-          {"time_s", FrameView(record).time_s()},
-          {"detected_frame", or_null(state.record.frame)},
-          {"space", state.space == TargetSpace::kPlane ? "plane" : "sphere"},
-          {"targets", std::move(targets)}};
-}
-
 std::string targets_line(const TargetsState& state) {
-  return targets_json(state, state.record).dump(-1, ' ', false, Json::error_handler_t::replace) +
+  return targets_json(list_targets(state, state.record))
+             .dump(-1, ' ', false, Json::error_handler_t::replace) +
          "\n";
 }
 

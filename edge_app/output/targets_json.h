@@ -1,17 +1,15 @@
 #pragma once
 // Targets as JSON: the answer of GET /api/v1/targets, the event `targets` and a line of
-// output.targets. Names and units: target_fields.yaml.
+// output.targets. Names and units: target_list_fields.yaml, target_fields.yaml.
 
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
-#include "edge_app/tracking/target_state.h"
+#include "edge_app/tracking/target_report.h"
 
 namespace alidade {
 
-// The targets in the frame of this record, which must have a time and an orientation.
-[[nodiscard]] nlohmann::ordered_json targets_json(const TargetsState& state,
-                                                  const OrientationRecord& record);
+[[nodiscard]] nlohmann::ordered_json targets_json(const TargetList& list);
 
 // The targets in the newest frame of detections that was accepted. Ends with a line feed.
 [[nodiscard]] std::string targets_line(const TargetsState& state);

@@ -1,7 +1,7 @@
 #pragma once
-// RecordLog: what the log says of records and of what came to light with them: telemetry too old,
-// clocks, repeated images, full queues. What may come with every record is logged rarely. For the
-// output thread.
+// RecordLog: logs what is remarkable about records and about what comes with them: telemetry too
+// old, clocks, repeated images, full queues. What may come with every record is logged rarely. For
+// the output thread.
 
 #include "edge_app/pipeline/realtime_stage.h"
 #include "platform/pan_tilt/pan_tilt_source.h"

@@ -1,15 +1,12 @@
 #pragma once
 // OrientationRecord: the result for one frame. RecordSink: where the records go.
-//
 // Angles are TRUE angles of the mechanism (measured / scale), rad. Angles, rates and q hold at
 // time_s, when row 0 was exposed. At row v each angle is
 //   angle + rate t + acceleration t^2 / 2,  t = v * line delay.
-// q is R_base_from_camera. Covariance and sigma are of a perturbation R * Exp(xi), xi in the camera
-// frame.
-// A record of a lost video has neither frame nor time_s. A frame that may have waited has no
-// time_s. In mode `none` there is no orientation, and the status says why. If OE mode is asked for,
-// a record of mode PT has a status that says why, and `ok` means mode OE. Fixed size and trivially
-// copyable: crosses the queue to the output thread by value.
+// q is R_base_from_camera. Covariance and sigma are of a perturbation R * Exp(xi), camera frame.
+// A record of a lost video has neither frame nor time_s; a frame that may have waited has no
+// time_s. In mode `none` there is no orientation. If OE mode is asked for, `ok` means mode OE.
+// Fixed size and trivially copyable: crosses the queue to the output thread by value.
 
 #include <array>
 #include <cstdint>

@@ -33,7 +33,7 @@ enum class RecordStatus : std::uint8_t {
   kTelemetryMissing,  // fewer than two usable samples so far
   // The frame lies more than TelemetryLimits::max_extrapolation_s beyond the newest trusted angle.
   // By how much: OrientationRecord::telemetry_age_s. The causes, and which key to change:
-  // edge_app/config/README.md.
+  // docs/records.md.
   kTelemetryTooOld,
   kTelemetryGap,          // the samples around the frame lie too far apart
   kFrameBeforeTelemetry,  // older than the oldest sample kept by more than max_extrapolation_s
@@ -44,7 +44,7 @@ enum class RecordStatus : std::uint8_t {
   kImageRepeated,  // the image before was sent again while the camera turned (RepeatedImages)
   kOtherZoom,      // no calibration for the zoom that the pan/tilt source reports
   kNotFinite,      // a stamp is not a finite number
-  kNotLocalized,   // without telemetry: it is not known, or no longer known, where the camera looks
+  kNotLocalized,   // without telemetry: where the camera looks is not known, or no longer known
   kNotCalibrated,  // mode PT: no calibration, or a withdrawn one: landmarks are not looked for
   kZoomMoves,  // mode PT: the lens moves, or has just left the zoom curve; no map to follow it with
   // Mode PT: the zoom curve does not know the focal length well enough here for landmarks to be

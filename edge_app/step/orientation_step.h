@@ -1,15 +1,11 @@
 #pragma once
 // OrientationStep: makes a record of each frame, from telemetry samples and frames in the order in
-// which they come. The live pipeline and a replay both use it. Pure: no thread, no clock of its
-// own.
-//
-// The frame clock gives a frame's time (frame_clock.h). The frame's middle row is looked up in the
-// telemetry at once, at time + clock offset; nothing waits for a later sample. In OE mode landmarks
-// of the image join in, with telemetry as prior (oe_mode.h). A status says why a record is not
-// better (record_status.h). How time, zoom, scene map and start-up enter, step by step:
-// docs/derivations.md.
+// which they come. The live pipeline and a replay both use it.
+// A frame's middle row is looked up in the telemetry at once; nothing waits for a later sample. In
+// OE mode landmarks of the image join in, with telemetry as prior (oe_mode.h). A status says why a
+// record is not better (record_status.h). Step by step: docs/derivations.md.
 // Fixed memory, taken by the constructor; afterwards nothing is allocated, thrown or locked. One
-// thread.
+// thread; no thread or clock of its own.
 
 #include <memory>
 #include <optional>
@@ -98,7 +94,7 @@ class OrientationStep {
   // The connection to the pan/tilt source was lost. The next sample ends that state.
   void telemetry_lost();
 
-  // image: not valid() stands for none; PT mode ignores it. It must outlive the maintain() that
+  // image: if there is none, not valid(); PT mode ignores it. It must outlive the maintain() that
   // follows.
   OrientationRecord add_frame(const FrameStamp& stamp, const ImageView& image, StepEvents* events);
   // Call once the record is out: updates the landmark map with the frame added last, or follows
@@ -117,9 +113,8 @@ class OrientationStep {
   // The frame added last is being localized by the scene map. False: its orientation cannot be
   // compared with the result.
   bool ask_about_base();
-  // The same for a frame without orientation, where there is no telemetry. *angular_velocity:
-  // rad/s, camera frame. False: it is not needed, or the camera cannot be followed from this frame
-  // on.
+  // The same for a frame without orientation, if there is no telemetry. *angular_velocity: rad/s,
+  // camera frame. False: it is not needed, or the camera cannot be followed from this frame on.
   bool ask_where_it_looks(Vector3<double>* angular_velocity);
   // The result of either request. From the next frame on records are in the map's base
   // (base_tie.h), whatever is adopted.

@@ -1,13 +1,9 @@
 #pragma once
 // RepeatedImages: which images of a stream repeat the one before exactly, although the camera had
 // turned.
-//
-// Frame rate converters, night modes and grabbers send an image again if they have no new one. It
-// is older than its stamp says. A camera at rest also sends equal images if its coding swallows the
-// noise: those are right. So an equal image counts as repeated if telemetry says that it should
-// have moved by kMoved_px since the first equal one, after kSigmas of telemetry's uncertainty are
-// taken off; and for kMemory_s after such an image. If the numbers of repeats vary, fresh images
-// are late by up to one interval.
+// An equal image counts as repeated if telemetry says that it should have moved by kMoved_px since
+// the first equal one, after kSigmas of telemetry's uncertainty are taken off; and for kMemory_s
+// after such an image. Why equal images alone show nothing: docs/derivations.md.
 // Seconds, px. Fixed memory, no allocation, one thread. Every kRowStep-th row is compared by
 // digest: 10 us at 1920x1080.
 
@@ -25,7 +21,7 @@
 
 namespace alidade {
 
-// Equal for equal images. Different, but for chance, if a sampled row differs. image: valid.
+// Equal for equal images. Different if a sampled row differs, except by chance. image: valid.
 [[nodiscard]] inline std::uint64_t image_digest(const ImageView& image) {
   constexpr int kRowStep = 32;
   constexpr std::size_t kLanes = 4;

@@ -6,15 +6,9 @@
 //                          its name.
 //   *.map-1a2b3c4d.bin     the map that a yaml names, beside it, tied to it by checksum
 //                          (map_file.h)
-// The zoom curve, used where no file has a calibration, is in the file of the calibration that
-// brought it; in FILE if that had no file yet.
-// A file that is damaged, unreadable or for another image size is set aside with its maps
-// (NAME.damaged, .damaged.1 ...), which is logged, and never used. A damaged map costs only the
-// map. Files are written atomically: first the map, under a name that no other content has, then
-// the yaml that names it, then the old map is removed. A power cut leaves the old pair or the new
-// one, and perhaps an unnamed map, which the next save removes. load() removes unfinished files of
-// a killed process.
-// Not for the real-time thread. One thread.
+// A damaged file is set aside and logged, never used. Files are written atomically: a power cut
+// leaves the old calibration and map, or the new ones. Where the zoom curve is, and the order of
+// writing: docs/derivations.md. Not for the real-time thread. One thread.
 
 #include <cstddef>
 #include <optional>

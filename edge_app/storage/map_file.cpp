@@ -156,7 +156,7 @@ bool is_positive(const Matrix<double, kSize, kSize>& covariance) {
 bool is_unit(const Vector3<double>& d) { return std::abs(d.norm() - 1) <= 1e-9; }
 
 constexpr const char* kNotFinite = "has a number that is not finite";
-constexpr const char* kNoUnit = "has a direction that is no unit vector";
+constexpr const char* kNoUnit = "has a direction that is not a unit vector";
 constexpr const char* kNotPositive = "has a covariance that is not positive";
 
 // "" if nothing is wrong.

@@ -23,8 +23,8 @@ namespace alidade {
 // The same for a file. One that cannot be read is an error, too.
 [[nodiscard]] bool load_plane(const std::string& path, PlaneEstimate* estimate, std::string* error);
 
-// The base's forward direction must not point straight up or down (kLeastForward), where it has no
-// heading.
+// The base's forward direction must not point straight up or down (kLeastForward), as it then has
+// no heading.
 [[nodiscard]] std::string format_plane(const PlaneEstimate& estimate, const PlaneFit& fit);
 
 }  // namespace alidade

@@ -208,7 +208,8 @@ bool SceneMapFile::update(const MapChange& change, std::string* error) {
   }
   for (const SceneLandmark& landmark : change.born) {
     if (landmark.id < scene.next_landmark) {
-      return refuse("refused to write: landmark " + std::to_string(landmark.id) + " has no new id",
+      return refuse("refused to write: landmark " + std::to_string(landmark.id) +
+                        " has an id that is not new",
                     error);
     }
     rows.add(landmark);

@@ -1,7 +1,7 @@
 #pragma once
 // RAII for SQLite's handles: a connection, a statement, a transaction. A connection keeps its first
-// failure until asked, and after it statements do nothing: so many steps can be taken with one
-// check at the end. One thread at a time.
+// failure until asked, and after it statements do nothing. So one check at the end covers many
+// steps. One thread at a time.
 // Changes go to a write-ahead log (NAME-wal, NAME-shm) or are unlogged. A rollback journal is never
 // written and never believed: one beside a database was put there by others, and SQLite would
 // delete the files that it names.
@@ -18,8 +18,8 @@ struct sqlite3_stmt;
 
 namespace alidade {
 
-// A file beside a database that SQLite does not leave there for this program; empty: there is none.
-// And the text for the user.
+// A file beside a database that SQLite did not leave there for this program; empty: there is none.
+// foreign_file_text() words it for the user.
 [[nodiscard]] std::string foreign_file_beside(const std::string& database);
 [[nodiscard]] std::string foreign_file_text(const std::string& file);
 

@@ -1,6 +1,6 @@
 #pragma once
-// SceneTap: now and then lends a live picture to the localizer, which finds by the scene map where
-// it looks. Pictures are wanted at the start, after a reconnection, when OE mode has lost its
+// SceneTap: now and then lends a live picture to the localizer, which finds where it looks by the
+// scene map. Pictures are wanted at the start, after a reconnection, when OE mode has lost its
 // landmarks or has found some, else each interval_s; without telemetry as soon as possible while
 // there is no orientation.
 //

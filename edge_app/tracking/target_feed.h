@@ -1,8 +1,8 @@
 #pragma once
 // TargetFeed: a TargetStage on a niced thread of its own, behind a bounded queue. offer() answers
 // at once whether detections are taken; nobody waits for the thread, and the threads on a record's
-// way do not depend on it. A frame that offer() has taken may still be refused by the stage, as a
-// late frame that came before; that is counted.
+// way do not depend on it. The stage may still refuse a frame that offer() has taken, for example a
+// late frame that came before. Such refusals are counted.
 
 #include <condition_variable>
 #include <deque>

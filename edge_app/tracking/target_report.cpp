@@ -105,6 +105,16 @@ bool shared_covariance(const FrameOrientation& shared_frame, const PlaneEstimate
   return true;
 }
 
+TargetList list_targets(const TargetsState& state, const OrientationRecord& record) {
+  TargetList list;
+  list.frame = record.frame;
+  list.time_s = FrameView(record).time_s();
+  list.detected_frame = state.record.frame;
+  list.space = state.space;
+  list.targets = report_targets(state, record);
+  return list;
+}
+
 std::vector<TargetReport> report_targets(const TargetsState& state,
                                          const OrientationRecord& record) {
   std::vector<TargetReport> out;

@@ -2,8 +2,8 @@
 // TargetReport: a target as people and programs get it, in any frame. Its state is moved to that
 // frame's middle row at constant velocity, also back in time, and projected into the frame's
 // picture. Covariances include the filter's and those of calibration and plane, which all targets
-// and frames share. For a target out of view the latter are as they were where it was last seen.
-// The box is that of its last detection, scaled to this frame.
+// and frames share. For a target out of view these two are as they were when it was last seen. The
+// box is that of its last detection, scaled to this frame.
 
 #include <cstdint>
 #include <optional>
@@ -34,7 +34,17 @@ struct TargetReport {
   std::optional<DetectionBox> box;  // if the target is in the picture
 };
 
+// The targets of one frame. Before the first frame of detections only the space is set.
+struct TargetList {
+  std::optional<std::int64_t> frame;           // that the targets were moved to
+  std::optional<double> time_s;                // s, its middle row
+  std::optional<std::int64_t> detected_frame;  // the newest whose detections were taken
+  TargetSpace space = TargetSpace::kPlane;
+  std::vector<TargetReport> targets;  // by identity
+};
+
 // record: with a time and an orientation.
+[[nodiscard]] TargetList list_targets(const TargetsState& state, const OrientationRecord& record);
 [[nodiscard]] std::vector<TargetReport> report_targets(const TargetsState& state,
                                                        const OrientationRecord& record);
 

@@ -1,5 +1,6 @@
 #pragma once
-// What target_fields.h needs besides TargetReport's own members.
+// What target_fields.h and target_list_fields.h need besides the members of TargetReport and
+// TargetList.
 
 #include <array>
 #include <cstddef>
@@ -14,6 +15,10 @@ namespace alidade {
 // The keys of an object.
 template <std::size_t kSize>
 using TargetKeys = std::array<const char*, kSize>;
+
+[[nodiscard]] inline std::string_view name_of(TargetSpace space) {
+  return space == TargetSpace::kPlane ? "plane" : "sphere";
+}
 
 [[nodiscard]] inline std::optional<std::string_view> class_of(const TargetReport& target) {
   if (target.name.empty()) return std::nullopt;

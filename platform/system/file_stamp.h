@@ -1,7 +1,7 @@
 #pragma once
 // FileStamp: detects that a file was changed or replaced, by device, inode, size and times. Two
 // writes within one tick of the file system's clock (some milliseconds) that leave the same size
-// are not told apart.
+// cannot be distinguished.
 
 #include <sys/stat.h>
 

@@ -4,10 +4,9 @@
 // video.mkv (row k of frames.csv belongs to picture k) or from frames/<frame, 6 digits>.png, .jpg
 // or .pgm. They must have an 8-bit luma plane (grey or YUV) and recording.yaml's size. A recording
 // with tracks.csv instead of pictures, and any recording if decode is false, gives frames without
-// luma. Pictures that cannot be decoded are skipped and counted. If video.mkv has B-frames, picture
-// k is the k-th in order of capture; rows whose sender_time_s contradict that order are refused. If
-// video.mkv ends before frames.csv, as after a kill of the recorder, the recording ends there;
-// missing_frames() is the number of rows left.
+// luma. Pictures that cannot be decoded are skipped and counted. If video.mkv ends before
+// frames.csv, the recording ends there; missing_frames() is the number of rows left. B-frames:
+// docs/derivations.md.
 
 #include <cstdint>
 #include <memory>

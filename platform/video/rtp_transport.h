@@ -85,7 +85,7 @@ class RtpPorts {
 };
 
 // Plain RTP, from a session description or an rtp:// URL. Packets of others than the senders and
-// the SSRC that the description names are left out; without a sender's address, choice chooses.
+// the SSRC that the description names are left out; without a sender's address, `choice` decides.
 class UdpTransport : public RtpTransport {
  public:
   UdpTransport(std::string sdp, SenderChoice* choice) : sdp_(std::move(sdp)), choice_(*choice) {}

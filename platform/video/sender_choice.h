@@ -1,5 +1,5 @@
 #pragma once
-// SenderChoice: whose packets of plain RTP are the video, where the description names no sender's
+// SenderChoice: whose packets of plain RTP are the video, if the description names no sender's
 // address: anyone can send to an open port or to a group.
 //
 //   on trial  one sender (address and SSRC) is followed: first the one that comes first. After

@@ -6,7 +6,7 @@
 IPC is instructions per clock where first-level misses hit the second level; what comes from memory, past the 512 KB
 that was simulated, is in the bytes. A range holds for one thread on a core of its own, not throttled. The processors'
 ranges are of two kinds and say which: stated by somebody, or judged here from how many instructions a core can take
-up in a clock. README.md has the table, and what speaks for and against it.
+up in a clock. docs/costs.md has the table, and what speaks for and against it.
 """
 import dataclasses
 

@@ -12,7 +12,7 @@
                                                      beside what it needs
 
 Exit: 0; 1: a stage costs over 5 % more, or something went wrong (one line); 77: there is nothing to compare with.
-Counts are the same from run to run. README.md says what they depend on.
+Counts are the same from run to run. docs/costs.md says what they depend on.
 """
 import argparse
 import json

@@ -13,6 +13,7 @@ import yaml
 TOP = pathlib.Path(__file__).resolve().parents[2]
 RECORD_LIST = "edge_app/record/record_fields.yaml"
 TARGET_LIST = "edge_app/tracking/target_fields.yaml"
+AROUND_TARGETS_LIST = "edge_app/tracking/target_list_fields.yaml"
 OPENAPI = "edge_app/output/openapi.yaml"
 RECORD = "edge_app/record/orientation_record.h"
 # Members that no field shows: metrics and status have the first, scene map upkeep uses the second.
@@ -33,6 +34,22 @@ OF_TARGETS = {
     "ros_wrapper/alidade_msgs/msg/Target.msg": "float64 height               # m; how tall it is; NaN: nobody knows",
     "ros_wrapper/alidade_ros/src/target_fields.cpp": 'message->height = read.number_or_nan("height_m");',
 }
+AROUND_TARGETS = {
+    "edge_app/tracking/target_list_fields.h": 'line->add("wind_m_s", list.wind_m_s);',
+    OPENAPI: "wind_m_s: {type: number, nullable: true, description: \"m/s; how fast the wind is; null: it is calm\"}",
+    "docs/target_tracking.md": "| `wind_m_s` | m/s | how fast the wind is; `null`: it is calm |",
+    "ros_wrapper/alidade_msgs/msg/Targets.msg": "float64 wind                 # m/s; how fast the wind is; NaN: it is calm",
+    "ros_wrapper/alidade_ros/src/target_list_fields.cpp": 'message->wind = read.number_or_nan("wind_m_s");',
+}
+NEW_AROUND_TARGETS = """
+- name: wind_m_s
+  type: number
+  unit: m/s
+  null_if: it is calm
+  says: how fast the wind is
+  value: list.wind_m_s
+  ros: {name: wind, type: float64, as: number_or_nan}
+"""
 NEW_OF_TARGETS = """
 - name: height_m
   type: number
@@ -61,7 +78,7 @@ class GeneratedFields(unittest.TestCase):
         self.addCleanup(folder.cleanup)
         self.top = pathlib.Path(folder.name)
         shutil.copytree(TOP / "scripts/fields", self.top / "scripts/fields", ignore=shutil.ignore_patterns("__pycache__"))
-        for file in {"scripts/generate-fields", ".clang-format", RECORD_LIST, TARGET_LIST, *OF_RECORDS, *OF_TARGETS}:
+        for file in {"scripts/generate-fields", ".clang-format", RECORD_LIST, TARGET_LIST, AROUND_TARGETS_LIST, *OF_RECORDS, *OF_TARGETS, *AROUND_TARGETS}:
             (self.top / file).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(TOP / file, self.top / file)
 
@@ -74,7 +91,8 @@ class GeneratedFields(unittest.TestCase):
         self.assertEqual(self.run_script("--check"), (0, ""))
 
     def test_a_new_field_is_wanted_everywhere_and_comes_everywhere(self):
-        for source, new, files in ((RECORD_LIST, NEW, OF_RECORDS), (TARGET_LIST, NEW_OF_TARGETS, OF_TARGETS)):
+        for source, new, files in ((RECORD_LIST, NEW, OF_RECORDS), (TARGET_LIST, NEW_OF_TARGETS, OF_TARGETS),
+                                   (AROUND_TARGETS_LIST, NEW_AROUND_TARGETS, AROUND_TARGETS)):
             with self.subTest(source=source):
                 path = self.top / source
                 path.write_text(path.read_text() + new)
@@ -88,13 +106,13 @@ class GeneratedFields(unittest.TestCase):
                     self.assertIn(line, (self.top / file).read_text())
 
     def test_an_interface_that_was_changed_by_hand_is_named(self):
-        for files, was, made in ((OF_RECORDS, "telemetry_age", "telemetry_old"), (OF_TARGETS, "latitude", "breadth")):
+        for files, was, made in ((OF_RECORDS, "telemetry_age", "telemetry_old"), (OF_TARGETS, "latitude", "breadth"), (AROUND_TARGETS, "space", "room")):
             for file in files:
                 path = self.top / file
                 path.write_text(path.read_text().replace(was, made))
         code, output = self.run_script("--check")
         self.assertEqual(code, 1)
-        for file in (*OF_RECORDS, *OF_TARGETS):
+        for file in (*OF_RECORDS, *OF_TARGETS, *AROUND_TARGETS):
             self.assertIn(f"{file}: not as ", output)
 
     def test_every_member_of_a_record_is_in_its_list(self):
@@ -129,7 +147,13 @@ class GeneratedFields(unittest.TestCase):
                       (new.replace("type: number", "type: integer"), "height_m: a ROS message cannot say that an integer is missing"),
                       (new.replace("space: plane", "space: air"), "height_m: space is air"),
                       (new.replace("null_if", "left_out_if").replace("type: number", "type: word"), "height_m: only a number may be left out"))
-        for source, slips in ((RECORD_LIST, of_records), (TARGET_LIST, of_targets)):
+        new = NEW_AROUND_TARGETS
+        around_targets = ((new.replace("says:", "sais:"), "wind_m_s: sais is unknown"),
+                          (new.replace("wind_m_s", "space"), "space stands there twice"),
+                          (new.replace("type: number", "type: targets"), "wind_m_s: targets cannot be null"),
+                          (new.replace("type: number", "type: targets").replace("null_if", "more").replace(", as: number_or_nan", ""),
+                           "wind_m_s: ros: as is missing"))
+        for source, slips in ((RECORD_LIST, of_records), (TARGET_LIST, of_targets), (AROUND_TARGETS_LIST, around_targets)):
             path = self.top / source
             text = path.read_text()
             for wrong, told in slips:

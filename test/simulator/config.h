@@ -3,7 +3,7 @@
 // file. An unknown key, a wrong type or a value out of range is an error with file and line.
 //
 // Units: inside the program SI (rad, s, px); the keys of the file carry their unit in their name
-// (README.md lists them). File names are relative to the folder of the configuration.
+// (docs/simulator.md lists them). File names are relative to the folder of the configuration.
 
 #include <Eigen/Core>
 #include <cstdint>

@@ -40,15 +40,21 @@ def json_schema(schema):
 SCHEMAS = {"components": json_schema(DESCRIPTION["components"])}
 
 
+def described_members(schema):
+    """The members that a schema describes itself, by reference or in the parts that it is made of."""
+    if "$ref" in schema:
+        schema = DESCRIPTION["components"]["schemas"][schema["$ref"].rpartition("/")[2]]
+    return set(schema.get("properties", ())).union(*(described_members(part) for part in schema.get("allOf", ())))
+
+
 def check(instance, schema):
     """Against a schema of the description; what an object holds must be described, too."""
     if "$ref" not in schema:
         schema = json_schema(schema)
     jsonschema.Draft7Validator({**SCHEMAS, "allOf": [schema]}).validate(instance)
-    name = schema.get("$ref", "").rpartition("/")[2]
-    properties = DESCRIPTION["components"]["schemas"].get(name, {}).get("properties")
-    if properties is not None:
-        unknown = set(instance) - set(properties)
+    properties = described_members(schema) if "$ref" in schema else None
+    if properties:
+        unknown = set(instance) - properties
         assert not unknown, f"not described: {unknown}"
 
 

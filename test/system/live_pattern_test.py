@@ -46,7 +46,7 @@ class LivePatternInBrief(Bench):
             wait_until(lambda: self.said(wrong, text), f"'{text}', while it is filmed")
         code, lines = wrong.end(signal.SIGINT)
         self.assertEqual((code, lines), (1, []), wrong.error_text())
-        self.assertTrue(wrong.errors[-1].startswith(f"alidade: {mjpeg['url']}: the pattern was found in no frame"),
+        self.assertTrue(wrong.errors[-1].startswith(f"alidade: {mjpeg['url']}: the pattern was not found in any frame"),
                         wrong.error_text())
         self.assertIn("7x5 are inner corners", wrong.errors[-1])
         self.assertFalse((self.folder / "wrong").exists())
@@ -57,7 +57,7 @@ class LivePatternInBrief(Bench):
         camera = self.camera(settings={**SETTINGS, "duration_s": 12, "pattern": board, "live": {"mjpeg_port": 0}})
         process = self.calibrate("gap", {"type": "mjpeg", "url": camera.others["mjpeg"]},
                                  pattern="aprilgrid:4x3:50mm:0.25")
-        gap = "the gap between its tags is 0.30 of a tag's side, not 0.25 as it was named"
+        gap = "the gap between its tags is 0.30 of a tag's side, but 0.25 was given"
         wait_until(lambda: self.said(process, f"images: {gap}"), "the gap, while it is filmed")
         code, lines = process.end(signal.SIGINT)
         self.assertEqual((code, lines), (1, []), process.error_text())

@@ -18,7 +18,7 @@ struct ImageView {
 
   [[nodiscard]] const std::uint8_t* row(int v) const { return luma + v * stride; }
 
-  // False for no image, and for rows that would overlap.
+  // False without an image, and for rows that would overlap.
   [[nodiscard]] bool valid() const {
     const std::ptrdiff_t step = stride < 0 ? -stride : stride;
     return luma != nullptr && width > 0 && height > 0 && (step >= width || height == 1);

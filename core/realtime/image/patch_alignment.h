@@ -4,10 +4,8 @@
 //   image(u + x) = gain * reference(centre + A x) + offset + slope . x + noise
 // x are kPatchSize^2 points 1 px apart around 0. A = d(reference pixel) / d(image pixel): the
 // caller's knowledge of scale, rotation and rolling-shutter shear. Estimated: u, gain, offset and
-// slope. The slope is the light's: vignetting would otherwise move every patch by hundredths of a
-// pixel.
-// Pixels are those of the octave: the caller scales by 2^l and 4^l. Valid within 2 px of the start
-// (98 % found, none wrong; two thirds at 3 px; waves of 6 to 40 px).
+// slope (of the light: vignetting would otherwise move patches).
+// Pixels are those of the octave: the caller scales by 2^l and 4^l. Valid within 2 px of the start.
 // Pure functions: no allocation, no state, no waiting. Derivation: docs/derivations.md.
 
 #include <Eigen/Core>

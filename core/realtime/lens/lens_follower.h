@@ -1,7 +1,7 @@
 #pragma once
 // LensFollower: the lens of each frame, once it differs from the one the map began with: what the
-// reading says, what is expected before landmarks are found, what they show, and the calibration of
-// the answer. Order of calls:
+// reading gives, what is expected before landmarks are found, what these show, and the calibration
+// of the answer. Order of calls:
 //   begin_frame()          takes the zoom reading, if there is one
 //   follow()               the lens leaves the map's; followed until begin() or give_up()
 //   expect_after_last(), expect_by_reading()
@@ -27,11 +27,11 @@ namespace alidade {
 struct LensFollowerOptions {
   LensTrackOptions track;
   ReadingBeliefOptions belief;
-  // >= 1; the lens is at rest after so many frames in a row without a rate or a moving reading.
+  // >= 1; the lens is at rest after this many frames in a row without a rate or a moving reading.
   int frames_at_rest = 3;
-  double resting_sigmas = 4;  // sigmas, > 0; a smaller rate counts as none
-  // >= 1; after so many lost frames in a row the map is taken to be another lens's, once the
-  // reading rests.
+  double resting_sigmas = 4;  // sigmas, > 0; a smaller rate counts as 0
+  // >= 1; after this many lost frames in a row the map counts as another lens's, once the reading
+  // rests.
   int frames_lost_for_good = 50;
   // Uncertainty without a reading, one standard deviation per unit of log f from the latest
   // reading, >= 0:

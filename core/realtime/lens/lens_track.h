@@ -1,9 +1,7 @@
 #pragma once
 // LensTrack: the lens from frame to frame, as landmarks show it: l = (log f, d log f / dt) at a
-// frame's middle row.
-// f is the one with which the map's landmarks fit at phi = 0 (lens_scale.h); the camera's is f
-// exp(phi). While the lens moves, each frame alone determines it to some 1e-5. A frame's prior is
-// the previous state, extrapolated:
+// frame's middle row. f is the one with which the map's landmarks fit at phi = 0 (lens_scale.h);
+// the camera's is f exp(phi). A frame's prior is the previous state, extrapolated:
 //   log f' = log f + rate dt,   rate' = rate
 // Both are driven by an acceleration that is constant between two frames and white from frame to
 // frame. At rest the first frame counts fully. Later ones count less, as neighbouring frames share

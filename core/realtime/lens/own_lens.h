@@ -13,7 +13,7 @@ namespace alidade {
 //   found - predicted + s phi = J (...) + z (dl_0 + t dl_1) + noise,   z = d u / d log f
 // s, t, J (...): see orientation_solve.h; dl: the correction of l. l is eliminated first.
 // The map's offset has learnt the calibration's errors at the map's zoom (a centre error of c px as
-// c / f). At this zoom their effect is another, and there are own_variances: both widen the test
+// c / f). At this zoom they have another effect, and own_variances come on top: both widen the test
 // for a contradiction.
 struct ZoomPrior {
   Vector2<double> value = Vector2<double>::Zero();  // expected minus predicted

@@ -1,9 +1,9 @@
 #pragma once
-// ReadLens: the lens that OE mode is told for each frame: the zoom curve's at the reading or, if
-// that is not believed (reading_belief.h), at the focal length that landmarks showed.
+// ReadLens: the lens that OE mode gets for each frame: the zoom curve's at the reading or, if that
+// is not believed (reading_belief.h), at the focal length that landmarks showed.
 // Order of calls for a frame:
 //   begin_frame()   its time
-//   look_up()       the lens to tell, or as_found() where there are no readings
+//   look_up()       the lens to pass on; as_found() if there are no readings
 //   note_found()    landmarks held;  judge() if the frame's reading was looked up
 // Fixed memory; no allocation. One thread.
 
@@ -26,7 +26,7 @@ class ReadLens {
   [[nodiscard]] bool look_up(const ZoomCurve& curve, const ZoomReadings& readings, double readout_s,
                              FrameLens* lens);
   // The curve's lens at the focal length that landmarks showed lately, carried on at its rate.
-  // False: they showed none, or the curve has none there.
+  // False: they showed no focal length, or the curve does not reach it.
   [[nodiscard]] bool as_found(const ZoomCurve& curve, FrameLens* lens) const;
   [[nodiscard]] double found_rate() const { return found_rate_; }  // 1/s, of log f
 

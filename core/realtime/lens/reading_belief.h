@@ -1,7 +1,7 @@
 #pragma once
 // ReadingJudge: whether a zoom reading is believed. Decided here only, from the lens that landmarks
 // showed; all others ask. There are two judges: ReadLens's judges the reading, LensFollower's the
-// lens that OE mode was told.
+// lens that OE mode was given.
 // Fixed memory; no allocation. One thread.
 
 #include <algorithm>
@@ -18,7 +18,7 @@ enum class ReadingBelief {
 struct ReadingBeliefOptions {
   // Standard deviations of reading and landmarks together, > 0; beyond it the reading is wrong.
   double excluded_sigmas = 5;
-  double longest_s = 0.5;  // s, > 0; for so long the lens that landmarks showed counts
+  double longest_s = 0.5;  // s, > 0; how long the lens that landmarks showed counts
   double fastest = 3;      // 1/s, > 0, of log f: 20 times in a second; no lens is faster
   // Of log f, > 0. For kJumped a reading's sigma counts as at most this, as it grows without bound
   // between readings far apart.
@@ -53,7 +53,7 @@ class ReadingJudge {
   [[nodiscard]] ReadingBelief belief(double age_s) const {
     return excluded_ && remembers(age_s) ? ReadingBelief::kExcluded : ReadingBelief::kBelieved;
   }
-  // The same where also the reading's change of log f since then is known, with its sigma.
+  // The same if the reading's change of log f since then is known too, with its sigma.
   [[nodiscard]] ReadingBelief belief(double age_s, double change, double sigma) const {
     if (!remembers(age_s)) return ReadingBelief::kBelieved;
     if (excluded_) return ReadingBelief::kExcluded;

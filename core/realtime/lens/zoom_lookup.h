@@ -30,8 +30,8 @@ class ZoomLookup {
   // are read out in readout_s. False: there is no reading, or the curve does not reach it.
   [[nodiscard]] bool calibration(const ZoomCurve& curve, double time_s, double readout_s,
                                  Calibration* calibration) const;
-  // The lens for OE mode, likewise. tolerance: device units; readings no further apart are of a
-  // lens that stands.
+  // The lens for OE mode, likewise. tolerance: device units; readings that are no further apart are
+  // of a resting lens.
   [[nodiscard]] bool lens(const ZoomCurve& curve, double time_s, double readout_s, double tolerance,
                           FrameLens* lens) const;
 
@@ -61,11 +61,11 @@ class ZoomLookup {
   std::size_t count_ = 0;  // of all readings ever added
 };
 
-// Up to this sigma of log f a zoom curve is good enough to begin landmarks where the camera could
+// Up to this sigma of log f a zoom curve is good enough to begin landmarks if the camera could
 // calibrate itself instead: less than 7 px at the border of an image 1280 px wide.
 inline constexpr double kSharpFocalLength = 0.01;
-// The same where the camera cannot calibrate itself. Beyond it the first landmarks do not hold
-// through a turn.
+// The same if the camera cannot calibrate itself. Beyond it the first landmarks do not hold through
+// a turn.
 inline constexpr double kRoughFocalLength = 0.05;
 // By this much of log f a lens may lie beyond the ends of the curve.
 inline constexpr double kBeyondEnds = 0.02;

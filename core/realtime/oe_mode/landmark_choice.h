@@ -2,13 +2,11 @@
 // LandmarkChoice: selects the visible fine landmarks to look for in a frame. choose() is the only
 // place that decides it. What a change of it touches: docs/landmark_choice.md.
 // If at most max_chosen fine landmarks are visible, all are chosen, in their order. Otherwise the
-// image is divided into columns x rows parts. The most reliable landmark of each part comes first,
-// with a stride between parts, so that a small max_chosen is spread over the image too. The
-// remaining room goes to the others in their order. The same inputs give the same choice, as it is
-// repeated within a frame.
-// Reliability is the share of matches when looked for (rule of succession), halved for each coarser
-// octave, which has half the resolution. The constructor takes all memory; nothing else allocates.
-// One thread.
+// most reliable landmark of each of columns x rows parts of the image comes first, with a stride
+// between parts; the others follow in their order. The same inputs give the same choice, as it is
+// repeated within a frame. Reliability is the share of matches when looked for (rule of
+// succession), halved for each coarser octave, which has half the resolution.
+// The constructor takes all memory; nothing else allocates. One thread.
 
 #include <cstdint>
 #include <vector>
@@ -26,9 +24,9 @@ struct LandmarkChoiceOptions {
   static constexpr int kMaxParts = 96;                            // in each direction
 
   int max_chosen = 200;  // landmarks, kLeastChosen to kMaxChosen
-  // Parts of the image, 1 to kMaxParts. If more parts than max_chosen have a landmark, some get
-  // none, spread over the image. A max_chosen above columns * rows is filled in the order of the
-  // map's slots.
+  // Parts of the image, 1 to kMaxParts. If more parts than max_chosen have a landmark, some parts
+  // get none; these are spread over the image. A max_chosen above columns * rows is filled in the
+  // order of the map's slots.
   int columns = 20;
   int rows = 12;
 

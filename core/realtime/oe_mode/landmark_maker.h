@@ -45,8 +45,8 @@ class LandmarkMaker {
   LandmarkMaker& operator=(const LandmarkMaker&) = delete;
 
   // frame.motion belongs to the image in the pyramid. visible: landmarks of the map in the image.
-  // lens: if the frame has its own, as in SearchedFrame. Returns the share of new landmarks in
-  // view, 0 to 1.
+  // lens: the frame's own, if it has one, as in SearchedFrame. Returns the share of new landmarks
+  // in view, 0 to 1.
   double make(const Calibration& calibration, const Pyramid& pyramid, const Octaves& octaves,
               const ProcessedFrame& frame, const std::vector<VisibleLandmark>& visible,
               LandmarkMap* map, const LensColumns* lens = nullptr);

@@ -1,13 +1,12 @@
 #pragma once
 // LandmarkMap: the landmarks, by slot and by cell of the sphere (PTCEE section V-A, Fig. 6).
-// Directions are unit vectors in the map's frame: the base frame but for an offset that OeMode
-// knows. The sphere is divided into rings of constant latitude, and each ring into cells of about
-// equal size. A cell holds at most one landmark of each octave (PTCEE V-A). Cells of octave l are
-// 2^l times as wide as those of octave 0, up to a largest size.
-// With a zooming lens, cells follow the image. A landmark made at 2^(zoom / 4) times the map's
-// first focal length has a cell 2^(-zoom / 4) times as wide, among those of its octave and zoom.
-// A full map replaces its least useful landmark by a new one: see worth(). The constructor takes
-// all memory; nothing else allocates, waits or throws. One thread.
+// Directions are unit vectors in the map's frame: the base frame, except for an offset that OeMode
+// knows. Rings of constant latitude are divided into cells of about equal size. A cell holds at
+// most one landmark of each octave. Cells of octave l are 2^l times as wide as those of octave 0,
+// up to a largest size. With a zooming lens, a landmark made at 2^(zoom / 4) times the map's first
+// focal length has a cell 2^(-zoom / 4) times as wide, among those of its octave and zoom. A full
+// map replaces its least useful landmark by a new one: see worth().
+// The constructor takes all memory; nothing else allocates, waits or throws. One thread.
 
 #include <array>
 #include <cstddef>
@@ -23,7 +22,7 @@ enum class InsertStatus {
   kOk,
   kCellTaken,  // by a landmark of this octave
   kFull,       // and none is worth less than a new one
-  kBad         // direction is no finite unit vector, or octave out of range
+  kBad         // direction is not a finite unit vector, or octave out of range
 };
 
 class LandmarkMap {

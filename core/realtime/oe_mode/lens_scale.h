@@ -1,15 +1,13 @@
 #pragma once
 // LensScale: phi, the difference of log f from the map's calibration, as a lens does not return
-// exactly to its zoom curve (zoom_curve.h). Learnt with the map's offset g, as telemetry ties the
-// two.
-//   the camera at phi: zoomed by phi (zoom_law.h); a distortion that is exact stays
+// exactly to its zoom curve (zoom_curve.h). Learnt with the map's offset g, which telemetry ties to
+// it. Landmarks and motions are stored at phi = 0; they change by S a per unit of phi.
+//   the camera at phi: zoomed by phi (zoom_law.h); an exact distortion stays the same
 //   d / d phi = S a of all that has a Sensitivity S;  a: by_zoom() of the camera, 0 where exact
 // The calibration's error is a phi + e. g and phi are known up to a noise of their own plus their
-// sensitivity times e; e, of covariance `others`, is independent of that noise and of the noise of
-// all measurements. Landmarks and motions are stored at phi = 0; they change by S a per unit of
-// phi.
-// Once the lens has moved (lens_track.h), phi is the scale of the map's directions. A frame's
-// camera then has its own f times exp(phi); see LensColumns. Plain values; no allocation.
+// sensitivity times e; e, of covariance `others`, is independent of that noise and of that of all
+// measurements. Once the lens has moved (lens_track.h), phi is the scale of the map's directions,
+// and a frame's camera has its own f times exp(phi): LensColumns. Plain values; no allocation.
 
 #include "core/model/calibration.h"
 #include "core/model/lens/zoom_law.h"

@@ -2,14 +2,12 @@
 // MapOffsetFilter: offset (pan, tilt) of the map against telemetry, a Kalman filter over all
 // telemetry; and the frames that wait for theirs.
 //   base angle = map angle + offset
-// Extrapolated telemetry teaches nothing yet. Its frame is pending until telemetry encloses its
-// time. Up to kMaxPending frames wait, in order of time. If there is no room the oldest is dropped,
-// as the next ones carry the same information. Each is settled once, the oldest first. Samples and
-// landmarks that were used before count less, by variance_inflation(). If the focal length is
-// learnt too (lens_scale.h), telemetry ties it to the offset: one filter of (offset, phi).
-// An innovation that contradicts offset and landmarks is rejected. If it came late, the frames
-// since are doubtful too: contradicted() until a frame agrees.
-// Fixed memory; no allocation. One thread.
+// Extrapolated telemetry teaches nothing yet: its frame waits until telemetry encloses its time. Up
+// to kMaxPending frames wait; each is settled once, the oldest first. Without room the oldest is
+// dropped. Samples and landmarks that were used before count less, by variance_inflation(). A
+// learnt focal length (lens_scale.h) joins the filter: (offset, phi). An innovation that
+// contradicts offset and landmarks is rejected, see contradicted(). Fixed memory; no allocation.
+// One thread. Derivation: docs/oe_mode.md.
 
 #include <array>
 #include <cstddef>

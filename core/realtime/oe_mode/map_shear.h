@@ -1,12 +1,11 @@
 #pragma once
 // MapShear: how far all landmarks may be sheared together, and what neighbouring frames show of it.
-// The first frame's landmarks are placed with telemetry's rate. Its error times the row's time is
-// in their directions. Every later frame shows the same wrong rate, and the landmarks it adds have
-// the same shear. The angles of neighbouring frames reveal it: derivatives of the curve through
-// kCurve of them are compared, in its middle, with the rate and acceleration that the map showed
-// there (Kalman). Derivation: docs/oe_mode.md.
+// The first frame's landmarks are placed with telemetry's rate, whose error times the row's time is
+// in their directions, and in those of all later landmarks. The angles of neighbouring frames
+// reveal it: derivatives of the curve through kCurve of them are compared, in its middle, with the
+// rate and acceleration that the map showed there, by a Kalman filter. Derivation: docs/oe_mode.md.
 // State of each axis: covariance of the errors of (angle, rate, acceleration) in a frame that looks
-// at tilt(), due to the shear. The angle's is only what has grown since the map began.
+// at tilt(), due to the shear. The angle's error counts from the map's beginning.
 // Fixed memory; no allocation. One thread.
 
 #include <array>

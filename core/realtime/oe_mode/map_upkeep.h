@@ -41,9 +41,9 @@ class MapUpkeep {
   // For another map.
   void reset();
 
-  // For each frame whose image was searched: landmarks held ...
+  // Call one of the two for each frame whose image was searched. Landmarks held.
   void note_held() { reset(); }
-  // ... or they did not. contradiction: they exclude telemetry. missed: they should have been in
+  // Landmarks did not hold. contradiction: they exclude telemetry. missed: they should have been in
   // view.
   void note_lost(bool contradiction, bool missed);
 

@@ -1,12 +1,9 @@
 #pragma once
 // ViewProjection: fast projection of many directions into one frame, with rolling shutter.
-// Same model as rolling_shutter.h. The orientation is prepared once per frame: R_camera_from_base
-// is a quadratic in the row, through its values at the first, middle and last row. The error is
-// below (w T)^3 / 15 rad for a rotation of w rad/s and half the read-out T: 3e-4 px if a field of
-// view of 60 degrees is crossed in a second at 25 us a row. The row is found by a secant from a
-// first guess.
-// A zooming lens (FrameMotion::zoom_rate) scales the direction's third component by exp(-zoom_rate
-// t).
+// Same model as rolling_shutter.h. R_camera_from_base is prepared once per frame, as a quadratic in
+// the row through its values at the first, middle and last row (error: docs/derivations.md). The
+// row is found by a secant from a first guess. A zooming lens (FrameMotion::zoom_rate) scales the
+// direction's third component by exp(-zoom_rate t).
 // Pure; no allocation. Directions outside the image are projected too, as far as the camera model
 // goes.
 

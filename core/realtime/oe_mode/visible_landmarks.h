@@ -33,7 +33,7 @@ class VisibleLandmarks {
 
   // In ascending order of slots; valid until the next call. octaves: of the image. across_octaves:
   // landmarks may be made at other focal lengths; each is then seen in the octave in which it has
-  // about its original size, or not at all if the image lacks that octave.
+  // about its original size, or not at all if the image does not have that octave.
   const std::vector<VisibleLandmark>& find(const Calibration& calibration, const LandmarkMap& map,
                                            const ViewProjection& view, int octaves,
                                            bool across_octaves);

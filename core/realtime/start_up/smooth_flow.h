@@ -2,12 +2,10 @@
 // SmoothFlow: motion of a far scene from one frame to the next, as a cubic polynomial of the
 // position in the image, fitted robustly. Units: px.
 //   moved(x, y) = sum over i + j <= 3 of c_ij x^i y^j,   (x, y) = (u - centre) / (width / 2)
-// A turning camera moves the image without parallax. The motion is smooth for any focal length,
-// distortion and rolling shutter. At a field of 60 degrees, k r^2 = 7 % in the corners and 77 px a
-// frame the polynomial fits to 0.2 px. Priors proportional to the motion keep few or bunched
-// samples from bending it.
-// Outliers are down-weighted (Geman and McClure), scaled by the median. Up to a third of the
-// image's middle may move by itself. At an edge without other samples the polynomial bends.
+// A turning camera moves the image without parallax, and smoothly for any focal length, distortion
+// and rolling shutter (how well it fits: docs/derivations.md). Priors proportional to the motion
+// keep few or bunched samples from bending it. Outliers are down-weighted (Geman and McClure),
+// scaled by the median: up to a third of the image's middle may move by itself.
 // The constructor takes all memory; nothing else allocates, waits or throws.
 
 #include <Eigen/Core>

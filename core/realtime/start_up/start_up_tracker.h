@@ -2,12 +2,10 @@
 // StartUpTracker: keypoint tracks from the video of an uncalibrated camera, for the first
 // calibration (PTCEE section V-A). Uses no focal length, distortion, read-out, mount or telemetry,
 // so a wrong one cannot do harm.
-// An observation is where a landmark appears: px, as in CONVENTIONS.md. Its covariance is the part
-// that differs between observations: the noise of its own frame. The noise of the reference image
-// is common to all observations of a landmark and moves the landmark instead.
-// A point ends if it leaves the image or is not found in two successive frames; later it is a new
-// landmark. Frames with nothing in common with the previous one end all points. Shifts of up to a
-// third of the image between frames are followed.
+// An observation is where a landmark appears: px, as in CONVENTIONS.md, with the covariance that
+// differs between observations (docs/derivations.md). A point ends if it leaves the image or is not
+// found in two successive frames; later it is a new landmark. Shifts of up to a third of the image
+// between frames are followed; frames with nothing in common end all points.
 // The constructor takes all memory; nothing else allocates, waits or throws. One thread.
 
 #include <array>
@@ -43,7 +41,7 @@ enum class StartUpStatus {
   kBegun,    // no points to follow; all are new
   kLost,     // the points were not found; the next frame is compared with the same previous frame
   kBlank,    // nothing to follow and nothing new
-  kBadImage  // no image, not of the constructor's size, or below 64 x 32 px
+  kBadImage  // no image, another size than the constructor's, or below 64 x 32 px
 };
 
 struct StartUpStatistics {

@@ -2,14 +2,10 @@
 // Angle and rate of the mount between telemetry samples, with covariance. Used by TelemetryBuffer
 // on a short run of neighbouring samples. Angles in rad as measured; times in s, telemetry clock.
 // The plain answer is a straight line through the two samples around the time (PTCEE 22 to 25). A
-// least-squares cubic replaces it if 6 to 8 neighbours pass a chi-square test (95 %): it averages
-// the noise and follows the curve. A jerk fails the test. The line's covariance then includes the
-// curvature of its surroundings. Both answers are weighted sums of the samples, so the first-order
-// covariance of angle and rate is exact.
-// A stamp's error has a part shared by neighbouring samples (a clock's offset) and its own part.
-// The difference of two own parts has the standard deviation period_sigma_s (PTCEE 20, 21, made
-// symmetric). At rate w a time error tau gives an angle error w tau on both axes, at acceleration
-// a, a tau^2 / 2. No allocation.
+// least-squares cubic replaces it if 6 to 8 neighbours pass a chi-square test (95 %). Both are
+// weighted sums of the samples, so the first-order covariance of angle and rate is exact.
+// The difference of two stamps' own errors has the standard deviation period_sigma_s (PTCEE 20,
+// 21). Why a cubic, and how stamps' errors enter: docs/derivations.md. No allocation.
 
 #include <cstdint>
 #include <limits>

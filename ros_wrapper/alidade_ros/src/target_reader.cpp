@@ -112,4 +112,31 @@ alidade_msgs::Box TargetReader::box(const char* name) const {
   return box;
 }
 
+bool TargetListReader::on_plane() const { return json_.at("space").get<std::string>() == "plane"; }
+
+std::int64_t TargetListReader::integer(const char* name) const {
+  return json_.at(name).get<std::int64_t>();
+}
+
+std_msgs::Header TargetListReader::header(const char* name) const {
+  std_msgs::Header header;
+  header.stamp = stamp_of(json_.at(name).get<double>(), clock_);
+  header.frame_id = on_plane() ? names_.plane : names_.base;
+  return header;
+}
+
+std::uint8_t TargetListReader::space(const char* name) const {
+  return json_.at(name).get<std::string>() == "plane" ? alidade_msgs::Targets::PLANE
+                                                      : alidade_msgs::Targets::SPHERE;
+}
+
+std::vector<alidade_msgs::Target> TargetListReader::targets(const char* name) const {
+  std::vector<alidade_msgs::Target> targets;
+  for (const Json& one : json_.at(name)) {
+    targets.emplace_back();
+    read_fields(TargetReader(one, on_plane(), clock_), &targets.back());
+  }
+  return targets;
+}
+
 }  // namespace alidade_ros

@@ -11,12 +11,6 @@ namespace {
 
 using Json = nlohmann::json;
 
-alidade_msgs::Target read_target(const Json& json, bool on_plane, const ClockMap& clock) {
-  alidade_msgs::Target target;
-  read_fields(TargetReader(json, on_plane, clock), &target);
-  return target;
-}
-
 }  // namespace
 
 bool parse_targets(const std::string& text, const ClockMap& clock, const FrameNames& names,
@@ -24,13 +18,7 @@ bool parse_targets(const std::string& text, const ClockMap& clock, const FrameNa
   try {
     const Json json = Json::parse(text);
     alidade_msgs::Targets read;
-    const bool on_plane = json.at("space").get<std::string>() == "plane";
-    read.header.stamp = stamp_of(json.at("time_s").get<double>(), clock);
-    read.header.frame_id = on_plane ? names.plane : names.base;
-    read.frame = json.at("frame").get<std::int64_t>();
-    read.space = on_plane ? alidade_msgs::Targets::PLANE : alidade_msgs::Targets::SPHERE;
-    for (const Json& target : json.at("targets"))
-      read.targets.push_back(read_target(target, on_plane, clock));
+    read_fields(TargetListReader(json, names, clock), &read);
     *targets = std::move(read);
     return true;
   } catch (const Json::exception& e) {

@@ -129,21 +129,22 @@ TEST(NetworkDetector, SaysInALineWhyItCannotBeUsed) {
     return error;
   };
   const std::string v8 = network_file("v8");
-  EXPECT_THAT(error_of("", of_cells()), ::testing::HasSubstr("is no ONNX network"));
+  EXPECT_THAT(error_of("", of_cells()), ::testing::HasSubstr("is not an ONNX network"));
   EXPECT_THAT(error_of("nothing of the kind", of_cells()),
-              ::testing::HasSubstr("is no ONNX network"));
+              ::testing::HasSubstr("is not an ONNX network"));
   EXPECT_THAT(error_of(v8.substr(0, v8.size() / 2), of_cells()),
-              ::testing::HasSubstr("is no ONNX network"));
+              ::testing::HasSubstr("is not an ONNX network"));
   NetworkOptions other_size = of_cells();
   other_size.width_px = 128;
-  EXPECT_THAT(error_of(v8, other_size), ::testing::HasSubstr("takes no pictures of 128x64 px"));
+  EXPECT_THAT(error_of(v8, other_size),
+              ::testing::HasSubstr("does not take pictures of 128x64 px"));
   EXPECT_THAT(error_of(network_file("pictures"), of_cells()),
               ::testing::HasSubstr("has an output of 1x1x8x8; expected 1x(4+classes)xN"));
   EXPECT_THAT(error_of(network_file("shares"), of_cells()),
-              ::testing::HasSubstr("tells boxes that are not in pixels of its input"));
+              ::testing::HasSubstr("gives boxes that are not in pixels of its input"));
   NetworkOptions three = of_cells();
   three.labels = {"a", "b", "c"};
-  EXPECT_THAT(error_of(v8, three), ::testing::HasSubstr("tells 2 classes, but there are 3 labels"));
+  EXPECT_THAT(error_of(v8, three), ::testing::HasSubstr("has 2 classes, but there are 3 labels"));
 }
 
 TEST(NetworkOptions, SayWhatIsWrong) {

@@ -73,7 +73,7 @@ TEST(PersonOptions, SayWhatIsWrong) {
   const char* error = nullptr;
   options.height_step = 1;
   EXPECT_FALSE(options.validate(&error));
-  EXPECT_STREQ(error, "height_step must be above 1, at most 2");
+  EXPECT_STREQ(error, "height_step must be above 1 and at most 2");
   options = {};
   options.height_m = kNan;
   EXPECT_FALSE(options.validate());

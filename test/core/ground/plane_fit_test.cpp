@@ -321,7 +321,7 @@ TEST_P(PlaneFitRefusal, SaysWhyAndWhatWouldHelp) {
 
 INSTANTIATE_TEST_SUITE_P(
     Each, PlaneFitRefusal,
-    testing::Values(Refusal{"PointsInALine", PlaneFitStatus::kUndetermined, "lie in a line",
+    testing::Values(Refusal{"PointsInALine", PlaneFitStatus::kUndetermined, "lie on a line",
                             [](PlaneScene* scene) {
                               for (const double t : {0.0, 1.0, 2.0, 3.5})
                                 scene->add_point({50 + 20 * t, -10 + 15 * t, 0});
@@ -341,7 +341,7 @@ INSTANTIATE_TEST_SUITE_P(
                               scene->add_point({90, 60, 0});
                               scene->add_point({20, 30, 0});
                             }},
-                    Refusal{"NoScale", PlaneFitStatus::kNoScale, "how large",
+                    Refusal{"NoScale", PlaneFitStatus::kNoScale, "nothing gives the scale",
                             [](PlaneScene* scene) {
                               scene->add_level();
                               scene->add_horizon(0.5);

@@ -40,16 +40,16 @@ TEST(MapChange, WhatDoesNotFitIsNamedAndChangesNothing) {
   const SceneMap before = random_scene_map(3, 5, 20);
   const SceneLandmark& there = before.landmarks[4];
   std::vector<std::pair<const char*, MapChange>> slips(8);
-  slips[0] = {"has no new id", {{}, {}, {landmark_with(before, there.id)}, {}}};
-  slips[1] = {"changes, and is not there", {{}, {landmark_with(before, 1000)}, {}, {}}};
-  slips[2] = {"changes, and is not there", {{}, {there}, {}, {there.id}}};
-  slips[3] = {"dies, and is not there", {{}, {}, {}, {1000}}};
-  slips[4] = {"dies, and is not there", {{}, {}, {}, {there.id, there.id}}};
-  slips[5] = {"which there is not", {{}, {there}, {}, {}}};
+  slips[0] = {"has an id that is not new", {{}, {}, {landmark_with(before, there.id)}, {}}};
+  slips[1] = {"is changed, but is not in the map", {{}, {landmark_with(before, 1000)}, {}, {}}};
+  slips[2] = {"is changed, but is not in the map", {{}, {there}, {}, {there.id}}};
+  slips[3] = {"is removed, but is not in the map", {{}, {}, {}, {1000}}};
+  slips[4] = {"is removed, but is not in the map", {{}, {}, {}, {there.id, there.id}}};
+  slips[5] = {"which does not exist", {{}, {there}, {}, {}}};
   slips[5].second.changed[0].sightings = {{99, {1, 2}, 1}};
-  slips[6] = {"no unit vector", {{}, {there}, {}, {}}};
+  slips[6] = {"not a unit vector", {{}, {there}, {}, {}}};
   slips[6].second.changed[0].d_b *= 2;
-  slips[7] = {"has no new id", {{before.keyframes[2]}, {}, {}, {}}};
+  slips[7] = {"has an id that is not new", {{before.keyframes[2]}, {}, {}, {}}};
   for (const auto& [what, change] : slips) {
     SceneMap map = before;
     std::string error;

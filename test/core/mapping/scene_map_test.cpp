@@ -93,7 +93,7 @@ TEST(SceneMap, EachNumberOutOfRangeIsNamed) {
       {"id out of range", [](SceneMap* m) { m->keyframes[0].id = 0; }},
       {"id out of range", [](SceneMap* m) { m->keyframes[11].id = (std::int64_t{1} << 53) + 1; }},
       {"id out of range", [](SceneMap* m) { m->landmarks[0].id = 0; }},
-      {"no id left", [](SceneMap* m) { m->next_landmark = (std::int64_t{1} << 53) + 2; }},
+      {"no id is left", [](SceneMap* m) { m->next_landmark = (std::int64_t{1} << 53) + 2; }},
       {"name", [&](SceneMap* m) { k(m).recording.assign(5000, 'a'); }},
       {"frame", [&](SceneMap* m) { k(m).frame = -1; }},
       {"time", [&](SceneMap* m) { k(m).time_utc_s = 1.7e18; }},
@@ -122,9 +122,9 @@ TEST(SceneMap, EachNumberOutOfRangeIsNamed) {
       {"found more", [&](SceneMap* m) { l(m).life.matched = l(m).life.looked_for + 1; }},
       {"out of order", [&](SceneMap* m) { std::swap(l(m).sightings[0], l(m).sightings[1]); }},
       {"not finite", [&](SceneMap* m) { l(m).sightings[1].u[0] = kNotANumber; }},
-      {"no size", [&](SceneMap* m) { l(m).sightings[1].scale_px = 0; }},
-      {"which there is not", [&](SceneMap* m) { l(m).sightings.back().keyframe = 99; }},
-      {"given twice", [](SceneMap* m) { m->next_landmark = m->landmarks.back().id; }},
+      {"sighting whose size", [&](SceneMap* m) { l(m).sightings[1].scale_px = 0; }},
+      {"which does not exist", [&](SceneMap* m) { l(m).sightings.back().keyframe = 99; }},
+      {"already in use", [](SceneMap* m) { m->next_landmark = m->landmarks.back().id; }},
       {"keyframes, at most", [](SceneMap* m) { m->keyframes.resize(100'001); }},
   };
   for (std::size_t i = 0; i < slips.size(); ++i) {
@@ -144,7 +144,7 @@ TEST(SceneMap, AnErrorNamesTheLandmark) {
   std::string error;
   EXPECT_FALSE(is_valid(map, &error));
   EXPECT_EQ(error, "landmark " + std::to_string(map.landmarks[4].id) +
-                       " has a direction that is no unit vector");
+                       " has a direction that is not a unit vector");
 }
 
 }  // namespace

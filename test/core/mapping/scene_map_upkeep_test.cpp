@@ -1,4 +1,5 @@
 #include "core/mapping/scene_map_upkeep.h"
+#include "core/mapping/map_projection.h"
 
 #include <gtest/gtest.h>
 

@@ -193,7 +193,7 @@ TEST(CalibratePattern, OnlyThePatternsShapeIsNoticed) {
   for (auto& p : data.points_m) p.x() *= 1.05;
   const PatternCalibration longer = calibrate_pattern(data);
   EXPECT_NE(longer.status, PatternStatus::kOk);
-  EXPECT_THAT(longer.message, HasSubstr("not as long and high as told"));
+  EXPECT_THAT(longer.message, HasSubstr("is the pattern flat, and of the given size"));
 }
 
 TEST(CalibratePattern, KnownParametersStayAsTheyAre) {
@@ -220,29 +220,30 @@ TEST(CalibratePattern, SaysWhatIsMissing) {
   };
   PatternData data = good;
   for (PatternFrame& frame : data.frames) frame.observations.clear();
-  refused(data, PatternStatus::kNoPattern, "found in no frame");
+  refused(data, PatternStatus::kNoPattern, "not found in any frame");
   data.frames.clear();
-  refused(data, PatternStatus::kNoPattern, "found in no frame");
+  refused(data, PatternStatus::kNoPattern, "not found in any frame");
   data = good;
   data.frames.resize(8);
-  refused(data, PatternStatus::kTooFewFrames, "in 8 frames only");
+  refused(data, PatternStatus::kTooFewFrames, "in only 8 frames");
   data = good;
   data.frames[3].time_s = data.frames[2].time_s;
-  refused(data, PatternStatus::kBadInput, "frame 3: the time stamp of the one before, 0.133333 s");
+  refused(data, PatternStatus::kBadInput,
+          "frame 3: it repeats the time stamp of the frame before, 0.133333 s");
   data.frames[3].time_s = data.frames[1].time_s;
-  refused(data, PatternStatus::kBadInput, "frame 3: its time stamp, 0.066667 s, lies before");
+  refused(data, PatternStatus::kBadInput, "frame 3: its time stamp, 0.066667 s, is earlier");
   data = good;
   data.frames[3].observations[0].u.x() = kNan;
   refused(data, PatternStatus::kBadInput, "frame 3: a detection is not a finite number");
   data = good;
   data.frames[3].observations[0].point = 54;
-  refused(data, PatternStatus::kBadInput, "frame 3: point 54 is none of the pattern's");
+  refused(data, PatternStatus::kBadInput, "frame 3: the pattern has no point 54");
 
   test::PatternScene brief = scene;
   brief.duration_s = 5;
   test::PatternScene still = brief;
   still.hand.amplitude.fill(0);
-  refused(test::simulate_pattern(still), PatternStatus::kNoLineDelay, "stayed where it was");
+  refused(test::simulate_pattern(still), PatternStatus::kNoLineDelay, "moved by only");
   test::PatternScene slow = brief;
   slow.speed = 0.02;
   const PatternCalibration hardly = calibrate_pattern(test::simulate_pattern(slow));
@@ -256,7 +257,8 @@ TEST(CalibratePattern, SaysWhatIsMissing) {
   far.hand.away_m = 6;
   const PatternCalibration from_afar = calibrate_pattern(test::simulate_pattern(far));
   EXPECT_EQ(from_afar.status, PatternStatus::kNoLens);
-  EXPECT_THAT(from_afar.message, AllOf(HasSubstr("focal length known to"), HasSubstr("go nearer")));
+  EXPECT_THAT(from_afar.message,
+              AllOf(HasSubstr("focal length is known to"), HasSubstr("go nearer")));
 
   test::PatternScene shaken = brief;
   shaken.speed = 8;

@@ -51,16 +51,16 @@ TEST(Charuco, DictionariesAreOpenCVs) {
 
 TEST(Charuco, SaysWhatIsWrongInOneLine) {
   test::expect_refused({
-      {"charuco:9x6:30mm", "square, marker and perhaps a dictionary"},
-      {"charuco:9x6:30mm:22mm:4x4_50:7", "square, marker and perhaps a dictionary"},
+      {"charuco:9x6:30mm", "square, marker and optionally a dictionary"},
+      {"charuco:9x6:30mm:22mm:4x4_50:7", "square, marker and optionally a dictionary"},
       {"charuco:9x6:30mm:22", "'22' is not a marker's length with its unit"},
       {"charuco:9x6:30mm:0.7", "'0.7' is not a marker's length with its unit"},
       {"charuco:9x6:22mm:30mm", "a marker of 30mm does not fit into a square of 22mm"},
-      {"charuco:9x6:22mm:22mm", "the square comes first"},
+      {"charuco:9x6:22mm:22mm", "give the square first"},
       {"charuco:9x6:30mm:-22mm", "does not fit"},
       {"charuco:2x6:30mm:22mm", "out of range"},
-      {"charuco:9x6:30mm:22mm:8x8_50", "'8x8_50' is no dictionary; known are 4x4_50"},
-      {"charuco:12x9:30mm:22mm", "54 markers, dictionary 4x4_50 only 50"},
+      {"charuco:9x6:30mm:22mm:8x8_50", "'8x8_50' is not a known dictionary; known are 4x4_50"},
+      {"charuco:12x9:30mm:22mm", "54 markers, but dictionary 4x4_50 has only 50"},
   });
 }
 
@@ -223,7 +223,7 @@ TEST(Charuco, APartThatFitsBothLayoutsWaitsForTheRest) {
         .size();
   };
   EXPECT_EQ(found_in(part), 0U);
-  EXPECT_THAT(detector.doubt(), HasSubstr("show it whole once"));
+  EXPECT_THAT(detector.doubt(), HasSubstr("show the whole board once"));
   EXPECT_EQ(found_in(raster.image), 8U * 5U);
   EXPECT_EQ(found_in(part), 7U * 5U);
   EXPECT_EQ(detector.doubt(), "");
@@ -296,11 +296,11 @@ TEST(Charuco, AnotherPatternIsNotFoundAndSaidSo) {
       {"dictionary",
        {"", Kind::kCharuco, 10, 7, 0.03, 0, 0},
        cv::aruco::DICT_5X5_100,
-       "no markers of dictionary 4x4_50 are seen, but some of 5x5_50; is it the board's"},
+       "markers of dictionary 5x5_50 are seen, but none of 4x4_50; what is the board's"},
       {"columns",
        {"", Kind::kCharuco, 7, 10, 0.03, 0, 0},
        0,
-       "check its counts, which are of squares"},
+       "check its counts (they count squares)"},
       {"marker's side",
        {"", Kind::kCharuco, 10, 7, 0.045, 0, 0},
        0,
@@ -309,10 +309,7 @@ TEST(Charuco, AnotherPatternIsNotFoundAndSaidSo) {
        {"", Kind::kChessboard, 9, 6, 0.03, 0, 0},
        0,
        "no markers of dictionary 4x4_50 are seen in any image"},
-      {"AprilGrid",
-       {"", Kind::kAprilGrid, 6, 6, 0.027, 0, 0},
-       0,
-       "An AprilGrid, too, has markers"}};
+      {"AprilGrid", {"", Kind::kAprilGrid, 6, 6, 0.027, 0, 0}, 0, "An AprilGrid also has markers"}};
   for (const Mistaken& mistaken : cases) {
     simulator::Config config = scene_of(mistaken.there);
     config.pattern->dictionary = mistaken.dictionary;

@@ -28,8 +28,8 @@ TEST(KnownPattern, ReadsWhatAPersonWrites) {
 
 TEST(KnownPattern, SaysWhatIsWrongInOneLine) {
   test::expect_refused({
-      {"", "no pattern"},
-      {"chess:9x6:25mm", "'chess' is no kind"},
+      {"", "no pattern is given"},
+      {"chess:9x6:25mm", "'chess' is not a kind"},
       {"chessboard:9x6", "kind, counts and length"},
       {"chessboard:9x6:25mm:0.3", "kind, counts and length"},
       {"chessboard:9:25mm", "'9' is not COLUMNSxROWS"},

@@ -13,9 +13,10 @@ TEST(NoCharuco, IsSaidInOneLineWithThePackageThatHelps) {
   for (const char* text : {"charuco:9x6:30mm:22mm", "charuco:9x6:30mm:22mm:6x6_250", "charuco"}) {
     std::string error;
     EXPECT_FALSE(parse_pattern(text, &error));
-    EXPECT_EQ(error, "'" + std::string(text) +
-                         "': this build of alidade has no ChArUco boards; they need Debian's "
-                         "package libopencv-contrib-dev when it is built");
+    EXPECT_EQ(error,
+              "'" + std::string(text) +
+                  "': this build of alidade cannot find ChArUco boards; build it with Debian's "
+                  "package libopencv-contrib-dev installed");
   }
   EXPECT_FALSE(simulator::PatternBoard::has_charuco());
 }

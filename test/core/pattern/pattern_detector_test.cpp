@@ -168,12 +168,12 @@ struct Misnamed {
 TEST(PatternDetector, AMisnamedAprilGridIsToldAsThat) {
   for (const Misnamed& misnamed :
        {Misnamed{"smaller", 6, 6, 0.3, "aprilgrid:6x6:27mm:0.25",
-                 "the gap between its tags is 0.30 of a tag's side, not 0.25 as it was named; is "
+                 "the gap between its tags is 0.30 of a tag's side, but 0.25 was given; is "
                  "it aprilgrid:6x6:27mm:0.30?"},
-        {"larger", 6, 6, 0.3, "aprilgrid:6x6:27mm:0.35", "is 0.30 of a tag's side, not 0.35"},
-        {"far off", 6, 6, 0.15, "aprilgrid:6x6:27mm:0.5", "is 0.15 of a tag's side, not 0.5 "},
+        {"larger", 6, 6, 0.3, "aprilgrid:6x6:27mm:0.35", "is 0.30 of a tag's side, but 0.35"},
+        {"far off", 6, 6, 0.15, "aprilgrid:6x6:27mm:0.5", "is 0.15 of a tag's side, but 0.5 "},
         {"rows for columns", 7, 5, 0.3, "aprilgrid:5x7:27mm:0.3",
-         "its tags lie in rows of 7, not of 5 as it was named; the tags of a row come first"}}) {
+         "its tags lie in rows of 7, but 5 were given; give the tags of a row first"}}) {
     for (const bool corner_squares : {true, false}) {
       simulator::Config config =
           scene_of({"", Kind::kAprilGrid, misnamed.columns, misnamed.rows, 0.027, 0, 0},

@@ -72,7 +72,7 @@ TEST(PatternDoubts, TwoBoardsAreNoticed) {
     data.frames[f].observations = other.frames[f].observations;
     for (PatternObservation& seen : data.frames[f].observations) seen.u.x() += scene.width;
   }
-  EXPECT_THAT(doubts_of(data), ElementsAre(HasSubstr("is there a second one in view? Cover it")));
+  EXPECT_THAT(doubts_of(data), ElementsAre(HasSubstr("is a second one in view? Cover it")));
   EXPECT_NE(calibrate_pattern(data).status, PatternStatus::kOk);
 }
 

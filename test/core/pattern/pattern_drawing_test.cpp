@@ -50,7 +50,7 @@ TEST(PatternDrawing, DrawsInTrueSize) {
 TEST(PatternDrawing, SaysWhatDoesNotFit) {
   std::string error;
   EXPECT_FALSE(draw_pattern(pattern_of("chessboard:9x6:25mm"), "a5", &error));
-  EXPECT_THAT(error, HasSubstr("'a5' is no paper; expected a4"));
+  EXPECT_THAT(error, HasSubstr("'a5' is not a known paper; expected a4"));
   EXPECT_FALSE(draw_pattern(pattern_of("chessboard:9x6:40mm"), "a4", &error));
   EXPECT_THAT(error, HasSubstr("400 x 280 mm, and a4 holds 287 x 200 mm"));
 }

@@ -70,7 +70,8 @@ TEST(PatternProgress, WhatLacksIsSaidAndNothingElse) {
     void (*spoil)(test::PatternScene*);
   };
   for (const auto& [what, spoil] :
-       {Case{"tilt it by 30 to 45 degrees, nearer by its side: left, right, upper, lower",
+       {Case{"tilt it by 30 to 45 degrees, with each of these sides nearer: left, right, upper, "
+             "lower",
              [](test::PatternScene* scene) {
                for (std::size_t i = 3; i < 6; ++i) scene->hand.amplitude[i] = 0.2;
              }},
@@ -128,7 +129,7 @@ TEST(PatternProgress, APatternThatIsNotFoundIsAllThatIsSaid) {
   }
   const std::vector<std::string> lost = advice_of(progress_of(data));
   ASSERT_FALSE(lost.empty());
-  EXPECT_THAT(lost.front(), HasSubstr("not found since 12 s; is it this pattern"));
+  EXPECT_THAT(lost.front(), HasSubstr("last found at 12 s; is it this pattern"));
   for (PatternFrame& frame : data.frames) frame.observations.clear();
   EXPECT_THAT(advice_of(progress_of(data)),
               ::testing::ElementsAre(HasSubstr("the pattern is not found; is it this pattern")));

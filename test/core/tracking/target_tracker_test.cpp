@@ -418,7 +418,7 @@ TEST(TargetTrackerOptions, AreChecked) {
   const char* error = nullptr;
   options.detection_probability = 1;
   EXPECT_FALSE(options.validate(&error));
-  EXPECT_STREQ(error, "detection_probability must be in (0, 1)");
+  EXPECT_STREQ(error, "detection_probability must be above 0 and below 1");
   options = {};
   options.birth_looks = 2;
   EXPECT_FALSE(options.validate());

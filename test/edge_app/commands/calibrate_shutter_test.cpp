@@ -160,7 +160,7 @@ TEST_F(CalibrateShutterCommand, WrongUnitsOfThePattern) {
         {"chessboard:9x6:25m", "'25m' is out of range, 0.1 mm to 10 m"},
         {"chessboard:9x6:0.00001mm", "is out of range"},
         {"chessboard:25mm:9x6", "'25mm' is not COLUMNSxROWS"},
-        {"chessbord:9x6:25mm", "'chessbord' is no kind of pattern"}}) {
+        {"chessbord:9x6:25mm", "'chessbord' is not a kind of pattern"}}) {
     expect_refused(calibrate(directory_.path(), pattern), 2, what);
   }
 }
@@ -188,10 +188,10 @@ TEST_F(CalibrateShutterCommand, AnAprilGridThatIsMisnamed) {
   const std::string video = directory_.path() + "/video";
   expect_refused(calibrate(video, "aprilgrid:4x3:50mm:0.25"), 1,
                  video +
-                     ": the gap between its tags is 0.30 of a tag's side, not 0.25 as it was "
-                     "named; is it aprilgrid:4x3:50mm:0.30?");
+                     ": the gap between its tags is 0.30 of a tag's side, but 0.25 was "
+                     "given; is it aprilgrid:4x3:50mm:0.30?");
   expect_refused(calibrate(video, "aprilgrid:3x4:50mm:0.3"), 1,
-                 "its tags lie in rows of 4, not of 3 as it was named");
+                 "its tags lie in rows of 4, but 3 were given");
 }
 
 // Of a build without OpenCV's aruco the package that it lacks.
@@ -199,11 +199,12 @@ TEST_F(CalibrateShutterCommand, NoCharucoBoardInAnyFrame) {
   write_greys(directory_, 64, 48, steady(14));
   const Result result = calibrate(directory_.path(), "charuco:9x6:30mm:22mm");
   if (!simulator::PatternBoard::has_charuco())
-    return expect_refused(result, 2, "no ChArUco boards; they need Debian's package libopencv");
+    return expect_refused(result, 2,
+                          "cannot find ChArUco boards; build it with Debian's package libopencv");
   expect_refused(result, 1, "9x6 are squares, every second one with a marker of 4x4_50");
   EXPECT_THAT(result.errors, HasSubstr("no markers of dictionary 4x4_50 are seen in any image"));
   expect_refused(calibrate(directory_.path(), "charuco:9x6:22mm:30mm"), 2,
-                 "a marker of 30mm does not fit into a square of 22mm; the square comes first");
+                 "a marker of 30mm does not fit into a square of 22mm; give the square first");
 }
 
 TEST_F(CalibrateShutterCommand, AnImageOneColumnWide) {

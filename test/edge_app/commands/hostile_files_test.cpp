@@ -203,7 +203,7 @@ TEST_F(HostileFiles, ANetworkThatEndsTheLibraryIsRefusedByName) {
   // One that was cut off is told as it was; the whole one is taken.
   const std::string cut = directory_.write("cut.onnx", bytes.substr(0, bytes.size() / 2));
   expect_refused({"run", "-c", with(cut), "--duration", "0.1"},
-                 cut + ": is no ONNX network that OpenCV can read");
+                 cut + ": is not an ONNX network that OpenCV can read");
   const Result taken =
       alidade({"run", "-c", with(std::string(ALIDADE_TEST_DATA) + "/bright_cells_v8.onnx"),
                "--duration", "0.1"});

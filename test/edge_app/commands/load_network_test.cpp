@@ -66,7 +66,8 @@ TEST(LoadNetwork, SaysInOneLineWhichFileIsWrongAndWhatWouldBeRight) {
   } slips[] = {
       {network_of(absent), absent, "No such file"},
       {network_of(directory.path()), directory.path(), "cannot be read: not a file, but a folder"},
-      {network_of(text), text, "is no ONNX network that OpenCV can read; export it with opset 12"},
+      {network_of(text), text,
+       "is not an ONNX network that OpenCV can read; export it with opset 12"},
       {network_of(cells("v8"), absent), absent, "No such file"},
       {labels("\n\n"), "labels.txt", "is empty; expected the classes' names, one a line"},
       {labels("a\n\n" + too_long + "\n"), "labels.txt:3",

@@ -1,4 +1,5 @@
-// A target's fields as JSON: which there are in which space, in which order, and what is null.
+// A target's fields and those around a frame's targets as JSON: which there are in which space, in
+// which order, and what is null.
 
 #include "edge_app/output/targets_json.h"
 
@@ -47,7 +48,7 @@ PlaneEstimate plane_with_origin() {
 }
 
 Json only_target(const TargetsState& state, const OrientationRecord& record) {
-  const Json json = targets_json(state, record);
+  const Json json = targets_json(list_targets(state, record));
   EXPECT_EQ(json["targets"].size(), 1U);
   return json["targets"].at(0);
 }
@@ -138,7 +139,16 @@ TEST(TargetsJson, OneLineForEachFrameOfDetections) {
   EXPECT_EQ(keys_of(json),
             (std::vector<std::string>{"frame", "time_s", "detected_frame", "space", "targets"}));
   EXPECT_EQ(json["frame"], 9);
+  EXPECT_EQ(json["time_s"], list_targets(state, state.record).time_s);
+  EXPECT_EQ(json["detected_frame"], 9);
   EXPECT_EQ(json["space"], "plane");
+}
+
+TEST(TargetsJson, BeforeTheFirstDetectionsOnlyTheSpaceIsKnown) {
+  TargetList list;
+  list.space = TargetSpace::kSphere;
+  EXPECT_EQ(targets_json(list).dump(),
+            R"({"frame":null,"time_s":null,"detected_frame":null,"space":"sphere","targets":[]})");
 }
 
 }  // namespace

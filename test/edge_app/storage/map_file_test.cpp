@@ -276,7 +276,7 @@ void expect_refused(void (*spoil)(MapContent*), const char* why) {
 TEST(MapFile, RefusesPointsThatMakeNoSense) {
   expect_refused([](MapContent* c) { c->points[1].d_b[1] = kNan; }, "not finite");
   expect_refused([](MapContent* c) { c->points[1].covariance(1, 1) = HUGE_VAL; }, "not finite");
-  expect_refused([](MapContent* c) { c->points[1].d_b *= 1 + 1e-6; }, "no unit vector");
+  expect_refused([](MapContent* c) { c->points[1].d_b *= 1 + 1e-6; }, "not a unit vector");
   expect_refused([](MapContent* c) { c->points[1].covariance(0, 0) *= -1; }, "not positive");
   expect_refused([](MapContent* c) { c->points[1].covariance(0, 1) = 1; }, "not positive");
   expect_refused([](MapContent* c) { c->points[1].observations = -1; }, "negative number");
@@ -284,7 +284,7 @@ TEST(MapFile, RefusesPointsThatMakeNoSense) {
 
 TEST(MapFile, RefusesLandmarksThatMakeNoSense) {
   expect_refused([](MapContent* c) { c->map.landmarks[1].d[2] = kNan; }, "landmark 1 has a number");
-  expect_refused([](MapContent* c) { c->map.landmarks[1].d.setZero(); }, "no unit vector");
+  expect_refused([](MapContent* c) { c->map.landmarks[1].d.setZero(); }, "not a unit vector");
   expect_refused([](MapContent* c) { c->map.landmarks[1].octave = 8; }, "octave");
   expect_refused([](MapContent* c) { c->map.landmarks[1].covariance(1, 1) = -1e-20; },
                  "not positive");

@@ -228,11 +228,11 @@ TEST_F(SceneMapFileTest, AChangeThatDoesNotFitChangesNothing) {
   std::vector<std::pair<const char*, MapChange>> slips(5, {"", change_of(map, 5)});
   slips[0].first = "has no landmark 5000";
   slips[0].second.died.push_back(5000);
-  slips[1].first = "has no new id";
+  slips[1].first = "has an id that is not new";
   slips[1].second.born[1].id = 1;
   slips[2].first = "not there";
   slips[2].second.born[1].sightings = {{5000, {1, 1}, 1}};
-  slips[3].first = "no unit vector";
+  slips[3].first = "not a unit vector";
   slips[3].second.changed[3].d_b.setZero();
   slips[4].first = "twice";
   slips[4].second.new_keyframes[0].id = map.keyframes[2].id;

@@ -1,20 +1,24 @@
 #pragma once
-// TargetReader: reads the fields of one target of the edge's JSON, each into the type and the
-// conventions of its message. What the target's space does not have is NaN. Throws Json::exception
-// for what cannot be understood.
+// TargetListReader: reads the fields of the edge's JSON with the targets of a frame, each into the
+// type and the conventions of its message. TargetReader: those of one target. What the target's
+// space does not have is NaN. Both throw Json::exception for what cannot be understood.
 
 #include <alidade_msgs/Box.h>
 #include <alidade_msgs/Pixel.h>
 #include <alidade_msgs/Target.h>
+#include <alidade_msgs/Targets.h>
 #include <geometry_msgs/Point.h>
 #include <geometry_msgs/Vector3.h>
+#include <std_msgs/Header.h>
 
 #include <boost/array.hpp>
 #include <cstdint>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
 #include "alidade_ros/clock_map.h"
+#include "alidade_ros/conversions.h"
 
 namespace alidade_ros {
 
@@ -56,7 +60,27 @@ class TargetReader {
   const ClockMap& clock_;
 };
 
-// All fields of the message; target_fields.cpp, which is generated.
+class TargetListReader {
+ public:
+  // Keeps references to all three.
+  TargetListReader(const nlohmann::json& list, const FrameNames& names, const ClockMap& clock)
+      : json_(list), names_(names), clock_(clock) {}
+
+  [[nodiscard]] std::int64_t integer(const char* name) const;
+  [[nodiscard]] std_msgs::Header header(const char* name) const;  // of this time and the space
+  [[nodiscard]] std::uint8_t space(const char* name) const;
+  [[nodiscard]] std::vector<alidade_msgs::Target> targets(const char* name) const;
+
+ private:
+  [[nodiscard]] bool on_plane() const;
+
+  const nlohmann::json& json_;
+  const FrameNames& names_;
+  const ClockMap& clock_;
+};
+
+// All fields of the messages; target_fields.cpp and target_list_fields.cpp, which are generated.
 void read_fields(const TargetReader& read, alidade_msgs::Target* message);
+void read_fields(const TargetListReader& read, alidade_msgs::Targets* message);
 
 }  // namespace alidade_ros
