@@ -146,6 +146,20 @@ void read_sensor(Section& section, SensorConfig* sensor) {
   });
 }
 
+void read_gear(Section& section, double quantum, TelemetryConfig* telemetry) {
+  for (const auto& [axis, gear] :
+       {std::pair{"pan", &telemetry->pan_gear}, {"tilt", &telemetry->tilt_gear}}) {
+    section.list(axis, [&, harmonics = gear](Section& item) {
+      GearHarmonic harmonic;
+      item.number("amplitude_mrad", &harmonic.amplitude, {0, 100}, kMilli);
+      item.number("period_deg", &harmonic.period, {0.01, 360}, kDegree);
+      item.number("phase_deg", &harmonic.phase, kAny, kDegree);
+      if (harmonic.period <= quantum) item.fail("period_deg must be more than quantum_deg");
+      harmonics->push_back(harmonic);
+    });
+  }
+}
+
 void read_telemetry(Section& section, TelemetryConfig* telemetry) {
   section.number("rate_hz", &telemetry->rate_hz, kPositive);
   section.number("sigma_rad", &telemetry->sigma, kNotNegative);
@@ -153,6 +167,7 @@ void read_telemetry(Section& section, TelemetryConfig* telemetry) {
   section.number("internal_rate_hz", &telemetry->internal_rate_hz, kNotNegative);
   section.number("stale_repeat_probability", &telemetry->stale_repeat_probability, kUnitInterval);
   section.number("latency_ms", &telemetry->latency, kNotNegative, kMilli);
+  section.section("gear", [&](Section& item) { read_gear(item, telemetry->quantum, telemetry); });
 }
 
 void read_jitter(Section& section, JitterConfig* jitter) {

@@ -93,6 +93,13 @@ struct SensorConfig {
   std::vector<Interval> covered;
 };
 
+// One part of a gear's error: what is reported is off by amplitude * sin(2 pi angle / period + phase).
+struct GearHarmonic {
+  double amplitude = 0;           // rad
+  double period = 6.28318530718;  // rad, of the true angle
+  double phase = 0;               // rad
+};
+
 struct TelemetryConfig {
   double rate_hz = 30;                  // of a recording; live, the client polls as it likes
   double sigma = 0;                     // rad
@@ -100,6 +107,7 @@ struct TelemetryConfig {
   double internal_rate_hz = 0;          // > 0: the device refreshes its value only so often
   double stale_repeat_probability = 0;  // a sample repeats its predecessor
   double latency = 0;                   // s, live only: age of the angle the device reports
+  std::vector<GearHarmonic> pan_gear, tilt_gear;
 };
 
 struct JitterConfig {

@@ -114,6 +114,11 @@ TEST_F(VirtualCameraConfig, NamesFileAndLineOfEveryMistake) {
            Mistake{"zoom: {path: {type: still, zoom: 0}}\n",
                    "camera.yaml:1: path: zoom 0 is not between 1 and 9999"},
            Mistake{"zoom: {path: {type: csv, file: none.csv}}\n", "none.csv: cannot be read"},
+           Mistake{"telemetry: {gear: {pan: [{amplitude_mrad: -1}]}}\n",
+                   "camera.yaml:1: amplitude_mrad is -1, must be between 0 and 100"},
+           Mistake{"telemetry: {gear: {roll: []}}\n", "camera.yaml:1: unknown key 'roll' in gear"},
+           Mistake{"telemetry: {quantum_deg: 0.1, gear: {tilt: [{period_deg: 0.1}]}}\n",
+                   "camera.yaml:1: period_deg must be more than quantum_deg"},
            Mistake{"pattern: {}\nzoom: {}\n", "camera.yaml:1: a pattern is seen without zoom"},
            Mistake{"camera: {line_delay_us: 60}\n",
                    "camera.yaml:1: camera: reading out all rows (line_delay_us x height) outlasts "

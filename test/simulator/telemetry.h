@@ -1,7 +1,8 @@
 #pragma once
-// What the virtual pan/tilt head reports: the true angle, scaled, noisy, rounded, sometimes old.
+// What the virtual pan/tilt head reports: the true angle, scaled, off by its gear, noisy, rounded, sometimes old.
 //
-//   measured = round(wrap(scale * wrap(true angle) + N(0, sigma)) / quantum) * quantum   (PTCEE 17)
+//   measured = round(wrap(scale * wrap(true angle) + gear(true angle) + N(0, sigma)) / quantum) * quantum   (PTCEE 17)
+//   gear(angle) = sum of amplitude * sin(2 pi angle / period + phase)
 //
 // With internal_rate_hz the head refreshes its value at multiples of that period and repeats it in
 // between: the value is then up to one such period old, half of it on average, and so much is to be
@@ -12,6 +13,7 @@
 #include <cstdint>
 #include <optional>
 #include <random>
+#include <vector>
 
 #include "test/simulator/path.h"
 #include "test/simulator/zoom.h"
@@ -20,6 +22,9 @@ namespace alidade::simulator {
 
 // Into [-pi, pi).
 [[nodiscard]] double wrapped(double angle);
+
+// The sum over a gear's harmonics, rad.
+[[nodiscard]] double gear_error(const std::vector<GearHarmonic>& gear, double angle);
 
 class Telemetry {
  public:

@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <iomanip>
+#include <sstream>
 #include <stdexcept>
 #include <utility>
 
@@ -52,6 +53,30 @@ void write_zoom(const Config& config, const Zoom& zoom, std::ofstream& out) {
   }
 }
 
+void write_gear(const std::vector<GearHarmonic>& gear, std::ostream& out) {
+  out << '[';
+  for (const GearHarmonic& harmonic : gear) {
+    out << (&harmonic == &gear.front() ? "" : ", ") << "{amplitude: " << harmonic.amplitude
+        << ", period: " << harmonic.period << ", phase: " << harmonic.phase << '}';
+  }
+  out << ']';
+}
+
+// What a calibration has no name for; nothing where the camera is as the model has it.
+void write_departures(const Config& config, std::ofstream& out) {
+  const TelemetryConfig& telemetry = config.telemetry;
+  std::ostringstream lines;
+  lines << std::setprecision(15);
+  if (!telemetry.pan_gear.empty() || !telemetry.tilt_gear.empty()) {
+    lines << "  gear: {pan: ";
+    write_gear(telemetry.pan_gear, lines);
+    lines << ", tilt: ";
+    write_gear(telemetry.tilt_gear, lines);
+    lines << "}\n";
+  }
+  if (!lines.str().empty()) out << "departures:\n" << lines.str();
+}
+
 }  // namespace
 
 void write_truth_yaml(const std::filesystem::path& file, const Config& config,
@@ -76,6 +101,7 @@ void write_truth_yaml(const std::filesystem::path& file, const Config& config,
   value("tilt_scale", config.camera.tilt_scale);
   value("clock_offset", config.camera.clock_offset);
   if (camera.zoom() != nullptr) write_zoom(config, *camera.zoom(), output.stream());
+  write_departures(config, output.stream());
   output.flush();
 }
 

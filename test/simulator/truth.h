@@ -14,6 +14,7 @@
 //                       reading, between steps too
 // With a zoom truth.yaml tells the lens at time 0, its reading (zoom), and besides zoom_samples, a list over the whole range of what
 // the lens is at a reading (zoom, focal_length, radial_distortion, centre_offset) if it comes back exactly.
+// What a camera is beyond a calibration's names stands under `departures`, in SI, only where it is stated (README.md).
 // Before a pattern truth.yaml holds the lens under the names of lens.yaml, and truth.csv the camera's pose in the pattern's frame
 // (x_m, y_m, z_m, q_x, q_y, q_z, q_w) in place of angles.
 
