@@ -168,6 +168,13 @@ void read_telemetry(Section& section, TelemetryConfig* telemetry) {
   section.number("stale_repeat_probability", &telemetry->stale_repeat_probability, kUnitInterval);
   section.number("latency_ms", &telemetry->latency, kNotNegative, kMilli);
   section.section("gear", [&](Section& item) { read_gear(item, telemetry->quantum, telemetry); });
+  section.section("play", [&](Section& item) {
+    using Encoder = PlayConfig::Encoder;
+    item.number("pan_mrad", &telemetry->play.pan, {0, 100}, kMilli);
+    item.number("tilt_mrad", &telemetry->play.tilt, {0, 100}, kMilli);
+    item.choice<Encoder>("encoder", &telemetry->play.encoder,
+                         {{"motor", Encoder::kMotor}, {"output", Encoder::kOutput}});
+  });
 }
 
 void read_jitter(Section& section, JitterConfig* jitter) {

@@ -100,6 +100,13 @@ struct GearHarmonic {
   double phase = 0;               // rad
 };
 
+// Backlash (played_path.h).
+struct PlayConfig {
+  enum class Encoder { kMotor, kOutput };
+  double pan = 0, tilt = 0;  // rad
+  Encoder encoder = Encoder::kMotor;
+};
+
 struct TelemetryConfig {
   double rate_hz = 30;                  // of a recording; live, the client polls as it likes
   double sigma = 0;                     // rad
@@ -108,6 +115,7 @@ struct TelemetryConfig {
   double stale_repeat_probability = 0;  // a sample repeats its predecessor
   double latency = 0;                   // s, live only: age of the angle the device reports
   std::vector<GearHarmonic> pan_gear, tilt_gear;
+  PlayConfig play;
 };
 
 struct JitterConfig {

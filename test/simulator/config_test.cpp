@@ -119,6 +119,8 @@ TEST_F(VirtualCameraConfig, NamesFileAndLineOfEveryMistake) {
            Mistake{"telemetry: {gear: {roll: []}}\n", "camera.yaml:1: unknown key 'roll' in gear"},
            Mistake{"telemetry: {quantum_deg: 0.1, gear: {tilt: [{period_deg: 0.1}]}}\n",
                    "camera.yaml:1: period_deg must be more than quantum_deg"},
+           Mistake{"telemetry: {play: {encoder: none}}\n",
+                   "camera.yaml:1: encoder must be one of: motor, output"},
            Mistake{"pattern: {}\nzoom: {}\n", "camera.yaml:1: a pattern is seen without zoom"},
            Mistake{"camera: {line_delay_us: 60}\n",
                    "camera.yaml:1: camera: reading out all rows (line_delay_us x height) outlasts "

@@ -1,7 +1,8 @@
 #pragma once
-// What the virtual pan/tilt head reports: the true angle, scaled, off by its gear, noisy, rounded, sometimes old.
+// What the virtual pan/tilt head reports: the angle that its encoder sees (with play not quite the camera's: played_path.h), scaled,
+// off by its gear, noisy, rounded, sometimes old.
 //
-//   measured = round(wrap(scale * wrap(true angle) + gear(true angle) + N(0, sigma)) / quantum) * quantum   (PTCEE 17)
+//   measured = round(wrap(scale * wrap(angle) + gear(angle) + N(0, sigma)) / quantum) * quantum   (PTCEE 17)
 //   gear(angle) = sum of amplitude * sin(2 pi angle / period + phase)
 //
 // With internal_rate_hz the head refreshes its value at multiples of that period and repeats it in

@@ -74,6 +74,11 @@ void write_departures(const Config& config, std::ofstream& out) {
     write_gear(telemetry.tilt_gear, lines);
     lines << "}\n";
   }
+  if (const PlayConfig& play = telemetry.play; play.pan > 0 || play.tilt > 0) {
+    lines << "  play: {pan: " << play.pan << ", tilt: " << play.tilt
+          << ", encoder: " << (play.encoder == PlayConfig::Encoder::kMotor ? "motor" : "output")
+          << "}\n";
+  }
   if (!lines.str().empty()) out << "departures:\n" << lines.str();
 }
 
