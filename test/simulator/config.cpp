@@ -17,6 +17,8 @@ constexpr double kPi = 3.14159265358979323846;
 constexpr double kDegree = kPi / 180;
 constexpr double kMilli = 1e-3;
 constexpr double kMicro = 1e-6;
+constexpr Range kDistance{0.6, 1e6};  // more than the pupil may be off
+
 void read_image(Section& section, ImageConfig* image) {
   section.integer("width", &image->width, {16, 16384});
   section.integer("height", &image->height, {16, 16384});
@@ -24,7 +26,8 @@ void read_image(Section& section, ImageConfig* image) {
 }
 
 void read_camera(Section& section, bool zooms, CameraConfig* camera) {
-  for (const char* key : {"focal_length_px", "radial_distortion"}) {
+  for (const char* key : {"focal_length_px", "radial_distortion", "radial_distortion_2",
+                          "tangential_distortion", "centre_px"}) {
     if (zooms && section.has(key)) {
       section.fail(std::string(key) + " belongs to a lens without zoom: zoom has its own");
     }
@@ -32,6 +35,17 @@ void read_camera(Section& section, bool zooms, CameraConfig* camera) {
   section.number("focal_length_px", &camera->focal_length, kPositive);
   section.number("aspect", &camera->aspect, kPositive);
   section.number("radial_distortion", &camera->radial_distortion);
+  section.number("radial_distortion_2", &camera->radial_distortion_2);
+  section.pair("tangential_distortion", &camera->tangential, 1);
+  section.pair("centre_px", &camera->centre, 1);
+  section.triple("pupil_cm", &camera->pupil, {-50, 50}, 1e-2);
+  section.section("breathing", [&](Section& item) {
+    using Type = Breathing::Type;
+    item.choice<Type>("type", &camera->breathing.type,
+                      {{"linear", Type::kLinear}, {"sine", Type::kSine}});
+    item.number("part", &camera->breathing.part, {-0.05, 0.05});
+    item.number("period_s", &camera->breathing.period, kPositive);
+  });
   section.number("line_delay_us", &camera->line_delay, kAny, kMicro);
   section.pair("pan_axis_mrad", &camera->pan_axis_offset, kMilli);
   section.pair("tilt_axis_mrad", &camera->tilt_axis_offset, kMilli);
@@ -62,11 +76,35 @@ void read_path(Section& section, PathConfig* path) {
   }
 }
 
+// A number, or nearest and farthest.
+void read_distance(Section& section, const char* key, bool map,
+                   std::optional<DistanceConfig>* distance) {
+  if (!section.has(key)) return;
+  DistanceConfig& given = distance->emplace();
+  if (!section.is_section(key)) {
+    section.number(key, &given.nearest, kDistance);
+    given.farthest = given.nearest;
+    return;
+  }
+  section.section(key, [&](Section& item) {
+    item.number("nearest", &given.nearest, kDistance);
+    item.number("farthest", &given.farthest, kDistance);
+    if (map) {
+      item.integer("layers", &given.layers, {0, 16});
+      item.number("length_deg", &given.length, {0.01, 180}, kDegree);
+    }
+    if (given.nearest == 0 || given.farthest < given.nearest) {
+      item.fail(std::string(key) + " needs nearest, and farthest that is not less");
+    }
+  });
+}
+
 PatchConfig read_direction(Section& section) {
   PatchConfig patch;
   section.number("azimuth_deg", &patch.azimuth, kAny, kDegree);
   section.number("elevation_deg", &patch.elevation, {-90, 90}, kDegree);
   section.number("width_deg", &patch.width, kPositive, kDegree);
+  read_distance(section, "distance_m", true, &patch.distance);
   return patch;
 }
 
@@ -204,6 +242,7 @@ void read_recording(Section& section, RecordingConfig* recording) {
                           {"none", Images::kNone}});
   section.number("landmark_spacing", &recording->landmark_spacing, kPositive);
   section.number("pixel_sigma_px", &recording->pixel_sigma, kNotNegative);
+  read_distance(section, "landmark_distance_m", false, &recording->landmark_distance);
 }
 
 void read_live(Section& section, LiveConfig* live) {
@@ -326,6 +365,10 @@ void read_config(Section& section, Config* config) {
   });
   section.path("truth_dir", &config->truth_dir);
   section.finish();
+  const Eigen::Vector2d centre = config->camera.centre.cwiseAbs();
+  if (centre.x() > config->image.width / 2.0 || centre.y() > config->image.height / 2.0) {
+    section.fail("camera: centre_px is beyond the image's border");
+  }
   if (std::abs(config->camera.line_delay) * config->image.height * config->image.rate_hz > 1) {
     section.fail("camera: reading out all rows (line_delay_us x height) outlasts a frame");
   }

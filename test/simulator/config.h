@@ -30,6 +30,14 @@ struct ImageConfig {
   double rate_hz = 25;  // on the host clock
 };
 
+// f drifts by a factor: 1 + part * t / period until then, or 1 + part / 2 * sin(2 pi t / period).
+struct Breathing {
+  enum class Type { kLinear, kSine };
+  Type type = Type::kLinear;
+  double part = 0;
+  double period = 12;  // s
+};
+
 struct CameraConfig {
   double focal_length = 1500;                                 // px
   double aspect = 1;                                          // f_v / f_u
@@ -40,6 +48,11 @@ struct CameraConfig {
   double pan_scale = 1;                                       // measured / true
   double tilt_scale = 1;                                      // measured / true
   double clock_offset = 0;                                    // s, telemetry clock - image clock
+  double radial_distortion_2 = 0;                             // k2, of r^4
+  Eigen::Vector2d tangential{Eigen::Vector2d::Zero()};        // p1, p2
+  Eigen::Vector2d centre{Eigen::Vector2d::Zero()};            // px, off the image's
+  Breathing breathing;
+  Eigen::Vector3d pupil{Eigen::Vector3d::Zero()};  // m, right, down, forward of where the axes meet
 };
 
 struct PathConfig {
@@ -52,6 +65,13 @@ struct PathConfig {
   double focal_length =
       0;  // px, whose fields of view are meant; 0: the camera's, with a zoom the longest of its path
   std::filesystem::path file;
+};
+
+// From where the axes meet (depth_map.h).
+struct DistanceConfig {
+  double nearest = 0, farthest = 0;  // m
+  int layers = 0;                    // 0: smooth
+  double length = 0.1;               // rad, over which it changes
 };
 
 // A rectangle on the sphere around a direction: a photo, generated texture, or one brightness.
@@ -67,6 +87,7 @@ struct PatchConfig {
   double azimuth_rate = 0, elevation_rate = 0;  // rad/s, moving objects only
   double brightness = 0.5;                      // flat areas and moving objects, 1 = white
   Projection projection = Projection::kTangent;
+  std::optional<DistanceConfig> distance;  // nothing: infinitely far
 };
 
 struct SceneConfig {
@@ -135,9 +156,10 @@ struct TimingConfig {
 
 struct RecordingConfig {
   enum class Images { kVideo, kPng, kPgm, kNone };
-  Images images = Images::kVideo;  // kNone: tracks.csv stands in place of images
-  double landmark_spacing = 0.1;   // of tracks.csv, in horizontal fields of view
-  double pixel_sigma = 0.3;        // px, of tracks.csv
+  Images images = Images::kVideo;                   // kNone: tracks.csv stands in place of images
+  double landmark_spacing = 0.1;                    // of tracks.csv, in horizontal fields of view
+  double pixel_sigma = 0.3;                         // px, of tracks.csv
+  std::optional<DistanceConfig> landmark_distance;  // of tracks.csv, drawn by ratio
 };
 
 struct LiveConfig {

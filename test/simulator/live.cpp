@@ -84,8 +84,7 @@ class Subject {
       poses_.emplace(folder / "truth.csv");
     } else {
       write_truth_yaml(folder / "truth.yaml", config, scene_->camera());
-      const Zoom* zoom = scene_->camera().zoom();
-      angles_.emplace(folder / "truth.csv", zoom != nullptr ? std::optional(*zoom) : std::nullopt);
+      angles_.emplace(folder / "truth.csv", scene_->camera());
     }
   }
   // Nothing without write_truth().

@@ -22,7 +22,8 @@ enum class Stream : std::uint64_t {
   kTexture,
   kTracks,
   kPeriods,
-  kZoom
+  kZoom,
+  kDepth
 };
 
 // The finaliser of splitmix64 (Steele, Lea, Flood 2014): every input bit changes half the output.

@@ -61,8 +61,7 @@ void write_recording_yaml(const Config& config, const fs::path& directory) {
 void write_frames(const std::vector<FrameEvent>& frames, const Path& path,
                   const CameraModel& camera, const fs::path& directory) {
   OutputFile stamps(directory / "frames.csv");
-  TruthCsv truth(directory / "truth.csv",
-                 camera.zoom() != nullptr ? std::optional(*camera.zoom()) : std::nullopt);
+  TruthCsv truth(directory / "truth.csv", camera);
   stamps.stream() << "frame,receive_time_s,sender_time_s,sequence\n";
   for (const FrameEvent& event : frames) {
     stamps.stream() << event.frame << ',' << event.stamp_s << ',' << event.sender_s << ','

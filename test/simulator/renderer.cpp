@@ -35,6 +35,16 @@ constexpr double kRestBlur = 1;  // px during the exposure
 // A zoom's preparation for one focal length serves from half of it on; a little less, as the lens is no tangent.
 constexpr double kServesFrom = 0.45;
 
+double largest_inverse_distance(const SceneConfig& scene) {
+  double largest = 0;
+  for (const auto* patches : {&scene.moving, &scene.flat, &scene.photos, &scene.procedural}) {
+    for (const PatchConfig& patch : *patches) {
+      if (patch.distance) largest = std::max(largest, 1 / patch.distance->nearest);
+    }
+  }
+  return largest;
+}
+
 // Directions that bound what the camera will see: a grid over the image, all along the path.
 std::vector<Sight> all_sights(const Config& config, const Path& path, const CameraModel& camera) {
   constexpr int kTimes = 600;
@@ -52,6 +62,7 @@ std::vector<Sight> all_sights(const Config& config, const Path& path, const Came
       sights.push_back({sights.back().focal_length / 2, {}});
     }
   }
+  const Eigen::Vector3d parallax = camera.pupil() * largest_inverse_distance(config.scene);
   for (int i = 0; i <= times; ++i) {
     const double time = length * i / times;
     const Eigen::Matrix3d turn = camera.base_from_camera_at(time);
@@ -62,10 +73,13 @@ std::vector<Sight> all_sights(const Config& config, const Path& path, const Came
         const double v = config.image.height * row / static_cast<double>(kGrid);
         const Eigen::Vector2d slope = camera.slope_at(u, v, time);
         if (slope.hasNaN()) continue;
-        const Eigen::Vector3d d_base = turn * slope.homogeneous().normalized();
+        const Eigen::Vector3d d_camera = slope.homogeneous().normalized();
         for (Sight& sight : sights) {
           const bool serves = lens.focal_length >= kServesFrom * sight.focal_length;
-          if (serves || &sight == &sights.back()) sight.seen.push_back(d_base);
+          if (!serves && &sight != &sights.back()) continue;
+          sight.seen.push_back(turn * d_camera);
+          if (!parallax.isZero(0))
+            sight.seen.push_back((turn * (d_camera + parallax)).normalized());
         }
       }
     }
@@ -100,7 +114,7 @@ Renderer::Renderer(const Config& config, const Path& path)
 }
 
 bool Renderer::steady() const {
-  return config_.sensor.boil == 0 && config_.scene.moving.empty() &&
+  return !camera_.breathes() && config_.sensor.boil == 0 && config_.scene.moving.empty() &&
          config_.sensor.brightness_steps.empty() && config_.sensor.covered.empty();
 }
 
@@ -113,7 +127,7 @@ Eigen::Vector2d Renderer::boil(double u, double v, double time_s) const {
   return sum;
 }
 
-void Renderer::rays_of_row(const Lens* lens, double v, double offset_u, double time_s,
+void Renderer::rays_of_row(const Lens& lens, double v, double offset_u, double time_s,
                            std::vector<double>* x, std::vector<double>* y) const {
   Eigen::Vector2d left = Eigen::Vector2d::Zero();
   Eigen::Vector2d right = boil(0, v, time_s);
@@ -125,8 +139,7 @@ void Renderer::rays_of_row(const Lens* lens, double v, double offset_u, double t
     }
     const Eigen::Vector2d shift = left + (right - left) * (within / double{kBoilStep});
     const double u = column + 0.5 + offset_u + shift.x();
-    const Eigen::Vector2d slope =
-        lens != nullptr ? lens->slope(u, v + shift.y()) : camera_.slope(u, v + shift.y());
+    const Eigen::Vector2d slope = camera_.slope_of(lens, u, v + shift.y());
     (*x)[static_cast<std::size_t>(column)] = slope.x();
     (*y)[static_cast<std::size_t>(column)] = slope.y();
   }
@@ -179,10 +192,10 @@ std::vector<std::uint8_t> Renderer::render(double t0_s, std::int64_t sequence) c
                                              ? kPointsAtRest.at(static_cast<std::size_t>(i))
                                              : kPointsInMotion.at(static_cast<std::size_t>(i % 8));
       const Lens lens = camera_.lens_at(time);
-      rays_of_row(camera_.zoom() != nullptr ? &lens : nullptr, v + offset_v, offset_u, time, &x,
-                  &y);
-      scene_.shade(camera_.base_from_camera_at(time), time, lens.focal_length, x.data(), y.data(),
-                   row_size, 1.0F / static_cast<float>(exposures), signal.data());
+      rays_of_row(lens, v + offset_v, offset_u, time, &x, &y);
+      scene_.shade(camera_.base_from_camera_at(time), camera_.pupil(), time, lens.focal_length,
+                   x.data(), y.data(), row_size, 1.0F / static_cast<float>(exposures),
+                   signal.data());
     }
 
     const double row_light = 255 * light(row_time);

@@ -42,8 +42,8 @@ class Renderer {
   };
 
   [[nodiscard]] Eigen::Vector2d boil(double u, double v, double time_s) const;
-  // lens: with a zoom, that of time_s; null: the camera's.
-  void rays_of_row(const Lens* lens, double v, double offset_u, double time_s,
+  // lens: that of time_s.
+  void rays_of_row(const Lens& lens, double v, double offset_u, double time_s,
                    std::vector<double>* x, std::vector<double>* y) const;
   [[nodiscard]] double light(double time_s) const;
 

@@ -128,6 +128,16 @@ Scene::Scene(const SceneConfig& config, const std::vector<Sight>& sights, bool z
     add_photo(procedural, make_procedural(kProceduralWidth, height, mix(texture_seed)), sights,
               config.detail, texture_seed);
   }
+  std::uint64_t depth_seed = mix(seed, static_cast<std::uint64_t>(Stream::kDepth));
+  for (Patch& patch : patches_) {
+    ++depth_seed;
+    if (patch.config.distance) patch.depth.emplace(*patch.config.distance, mix(depth_seed));
+  }
+  const auto distance = [](const Patch& patch) {
+    return patch.depth ? patch.depth->nearest() : std::numeric_limits<double>::infinity();
+  };
+  std::stable_sort(patches_.begin(), patches_.end(),
+                   [&](const Patch& a, const Patch& b) { return distance(a) < distance(b); });
   if (patches_.size() > kMostPatches) {
     throw ConfigError("scene: at most " + std::to_string(kMostPatches) + " patches can be seen");
   }
@@ -137,7 +147,7 @@ void Scene::add_object(const PatchConfig& config, const cv::Mat& picture) {
   const Eigen::Vector2d half_size(half_extent(config.projection, config.width),
                                   half_extent(config.projection, config.height));
   const Eigen::Vector2d texels(picture.cols, picture.rows);
-  Patch patch{config, half_size, {}};
+  Patch patch{config, half_size, {}, {}};
   patch.layers.push_back({Texture(picture), -half_size, texels.cwiseQuotient(2 * half_size),
                           Eigen::AlignedBox2d(-half_size, half_size)});
   patches_.push_back(std::move(patch));
@@ -153,7 +163,7 @@ void Scene::add_photo(const PatchConfig& config, const cv::Mat& photo,
     throw ConfigError(name + ": is more than 180 degrees high; make it narrower");
   }
   const double photo_density = photo.cols / (2 * half_size.x());
-  Patch patch{config, half_size, {}};
+  Patch patch{config, half_size, {}, {}};
   for (const Sight& sight : sights) {
     const auto part = seen_part(config, sight.seen, half_size);
     if (!part) continue;
@@ -203,9 +213,9 @@ float Scene::zoomed_sample(const Patch& patch, std::size_t layer, double level,
   return value + part * (coarse.texture.sample(other.x(), other.y(), 0) - value);
 }
 
-void Scene::shade(const Eigen::Matrix3d& base_from_camera, double time_s, double focal_length,
-                  const double* x, const double* y, std::size_t count, float weight,
-                  float* sum) const {
+void Scene::shade(const Eigen::Matrix3d& base_from_camera, const Eigen::Vector3d& pupil,
+                  double time_s, double focal_length, const double* x, const double* y,
+                  std::size_t count, float weight, float* sum) const {
   std::array<Eigen::Matrix3d, kMostPatches> patch_from_camera;
   for (std::size_t n = 0; n < patches_.size(); ++n) {
     const PatchConfig& config = patches_[n].config;
@@ -227,13 +237,19 @@ void Scene::shade(const Eigen::Matrix3d& base_from_camera, double time_s, double
       std::array<double, kBlock> down{};
       std::array<float, kBlock> cover{};
       float most = 0;
+      const bool parallax = patch.depth && !pupil.isZero(0);
+      const Eigen::Vector3d from = turn * pupil;
+      const auto coordinates = [&](const Eigen::Vector3d& v) {
+        return patch_coordinates(patch.config.projection, v.x(), v.y(), v.z());
+      };
       for (std::size_t i = 0; i < size; ++i) {
         const double ray_x = x[start + i];
         const double ray_y = y[start + i];
-        const Eigen::Vector2d point = patch_coordinates(
-            patch.config.projection, turn(0, 0) * ray_x + turn(0, 1) * ray_y + turn(0, 2),
-            turn(1, 0) * ray_x + turn(1, 1) * ray_y + turn(1, 2),
-            turn(2, 0) * ray_x + turn(2, 1) * ray_y + turn(2, 2));
+        const Eigen::Vector3d ray(turn(0, 0) * ray_x + turn(0, 1) * ray_y + turn(0, 2),
+                                  turn(1, 0) * ray_x + turn(1, 1) * ray_y + turn(1, 2),
+                                  turn(2, 0) * ray_x + turn(2, 1) * ray_y + turn(2, 2));
+        const Eigen::Vector2d point =
+            parallax ? patch.depth->seen(ray, from, coordinates) : coordinates(ray);
         right[i] = point.x();
         down[i] = point.y();
         const double inside =

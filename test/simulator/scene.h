@@ -8,15 +8,18 @@
 // Each patch is prepared at the density the camera needs (about 1.4 texels a pixel at the optical
 // axis), over the part that will be seen; under a zoom once for each doubling of the focal length, over what is seen at about
 // that one or a longer one, and what lies between two densities is made of both. Brightness: 0 black, 1 white, linear.
-// shade() is thread-safe and does not allocate.
+// A patch with a distance is seen from the camera's pupil (depth_map.h), and the nearer patch is in front of the farther one,
+// whatever their order. shade() is thread-safe and does not allocate.
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "test/simulator/config.h"
+#include "test/simulator/depth_map.h"
 #include "test/simulator/texture.h"
 
 namespace alidade::simulator {
@@ -40,8 +43,10 @@ class Scene {
 
   // Adds to sum[i] the brightness along each ray (x[i], y[i], 1) of the camera frame, times weight.
   // Neighbours in the arrays are neighbours in the image, a pixel apart. A NaN ray adds nothing. focal_length: of that moment, px.
-  void shade(const Eigen::Matrix3d& base_from_camera, double time_s, double focal_length,
-             const double* x, const double* y, std::size_t count, float weight, float* sum) const;
+  // pupil: in the camera frame, m.
+  void shade(const Eigen::Matrix3d& base_from_camera, const Eigen::Vector3d& pupil, double time_s,
+             double focal_length, const double* x, const double* y, std::size_t count, float weight,
+             float* sum) const;
 
  private:
   struct Layer {
@@ -53,8 +58,9 @@ class Scene {
   };
   struct Patch {
     PatchConfig config;
-    Eigen::Vector2d half_size;  // of the whole patch, in patch coordinates
-    std::vector<Layer> layers;  // the densest first
+    Eigen::Vector2d half_size;      // of the whole patch, in patch coordinates
+    std::vector<Layer> layers;      // the densest first
+    std::optional<DepthMap> depth;  // nothing: infinitely far
   };
 
   void add_photo(const PatchConfig& config, const cv::Mat& photo, const std::vector<Sight>& sights,

@@ -39,9 +39,7 @@ void write_centre_offset(const ImageConfig& image, const Lens& lens, std::ofstre
 
 void write_zoom(const Config& config, const Zoom& zoom, std::ofstream& out) {
   constexpr int kSamples = 129;
-  out << "centre_offset: {value: ";
-  write_centre_offset(config.image, zoom.lens(0), out);
-  out << ", sigma: [0, 0]}\nzoom: " << zoom.reading(0) << "\nzoom_samples:\n";
+  out << "zoom: " << zoom.reading(0) << "\nzoom_samples:\n";
   const ZoomConfig::Ends& ends = config.zoom->reading;
   for (int i = 0; i < kSamples; ++i) {
     const double reading = ends.wide + (ends.tele - ends.wide) * i / (kSamples - 1);
@@ -65,8 +63,25 @@ void write_gear(const std::vector<GearHarmonic>& gear, std::ostream& out) {
 // What a calibration has no name for; nothing where the camera is as the model has it.
 void write_departures(const Config& config, std::ofstream& out) {
   const TelemetryConfig& telemetry = config.telemetry;
+  const CameraConfig& camera = config.camera;
   std::ostringstream lines;
   lines << std::setprecision(15);
+  if (camera.radial_distortion_2 != 0) {
+    lines << "  radial_distortion_2: " << camera.radial_distortion_2 << '\n';
+  }
+  if (!camera.tangential.isZero(0)) {
+    lines << "  tangential_distortion: [" << camera.tangential.x() << ", " << camera.tangential.y()
+          << "]\n";
+  }
+  if (!camera.pupil.isZero(0)) {
+    lines << "  pupil: [" << camera.pupil.x() << ", " << camera.pupil.y() << ", "
+          << camera.pupil.z() << "]\n";
+  }
+  if (const Breathing& breathing = camera.breathing; breathing.part != 0) {
+    lines << "  breathing: {type: "
+          << (breathing.type == Breathing::Type::kLinear ? "linear" : "sine")
+          << ", part: " << breathing.part << ", period: " << breathing.period << "}\n";
+  }
   if (!telemetry.pan_gear.empty() || !telemetry.tilt_gear.empty()) {
     lines << "  gear: {pan: ";
     write_gear(telemetry.pan_gear, lines);
@@ -105,6 +120,11 @@ void write_truth_yaml(const std::filesystem::path& file, const Config& config,
   value("pan_scale", config.camera.pan_scale);
   value("tilt_scale", config.camera.tilt_scale);
   value("clock_offset", config.camera.clock_offset);
+  if (camera.zoom() != nullptr || !config.camera.centre.isZero(0)) {
+    output.stream() << "centre_offset: {value: ";
+    write_centre_offset(config.image, lens, output.stream());
+    output.stream() << ", sigma: [0, 0]}\n";
+  }
   if (camera.zoom() != nullptr) write_zoom(config, *camera.zoom(), output.stream());
   write_departures(config, output.stream());
   output.flush();
@@ -128,11 +148,12 @@ void write_lens_yaml(const std::filesystem::path& file, const Config& config) {
   output.flush();
 }
 
-TruthCsv::TruthCsv(const std::filesystem::path& file, std::optional<Zoom> zoom)
-    : file_(file), zoom_(std::move(zoom)) {
+TruthCsv::TruthCsv(const std::filesystem::path& file, const CameraModel& camera)
+    : file_(file), camera_(&camera), tells_lens_(camera.zoom() != nullptr || camera.breathes()) {
   file_.stream() << "frame,time_s,pan_rad,tilt_rad,sequence,sender_time_s,stamp_time_s"
-                 << (zoom_ ? ",focal_length_px,radial_distortion,centre_u_px,centre_v_px,zoom" : "")
-                 << '\n';
+                 << (tells_lens_ ? ",focal_length_px,radial_distortion,centre_u_px,centre_v_px"
+                                 : "")
+                 << (camera.zoom() != nullptr ? ",zoom" : "") << '\n';
 }
 
 void TruthCsv::add(const FrameEvent& event, const Angles& angles, double origin_s) {
@@ -140,11 +161,12 @@ void TruthCsv::add(const FrameEvent& event, const Angles& angles, double origin_
   out << event.frame << ',' << origin_s + event.capture_s << ',' << wrapped(angles.pan) << ','
       << wrapped(angles.tilt) << ',' << event.sequence << ',' << origin_s + event.sender_s << ','
       << origin_s + event.stamp_s;
-  if (zoom_) {
-    const Lens lens = zoom_->lens(event.capture_s);
+  if (tells_lens_) {
+    const Lens lens = camera_->lens_at(event.capture_s);
     out << ',' << lens.focal_length << ',' << lens.radial_distortion << ',' << lens.centre.x()
-        << ',' << lens.centre.y() << ',' << zoom_->reading(event.capture_s);
+        << ',' << lens.centre.y();
   }
+  if (const Zoom* zoom = camera_->zoom()) out << ',' << zoom->reading(event.capture_s);
   out << '\n';
 }
 
