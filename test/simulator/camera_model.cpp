@@ -90,13 +90,26 @@ Eigen::Matrix3d CameraModel::base_from_camera(const Angles& angles) const {
          Eigen::AngleAxisd(angles.tilt, tilt_axis_).toRotationMatrix() * base_from_rdf;
 }
 
-std::optional<Eigen::Vector2d> CameraModel::project_rolling(const Eigen::Vector3d& d_base,
+Eigen::Matrix3d CameraModel::world_from_camera_at(double time_s) const {
+  const Eigen::Matrix3d turned = base_from_camera_at(time_s);
+  if (!sways()) return turned;
+  Eigen::Vector3d sway = Eigen::Vector3d::Zero();
+  for (const Swing& swing : camera_.sway) {
+    sway[static_cast<int>(swing.axis)] +=
+        swing.amplitude * std::sin(kTwoPi * swing.frequency * time_s + swing.phase);
+  }
+  const double angle = sway.norm();
+  if (angle == 0) return turned;
+  return Eigen::AngleAxisd(angle, sway / angle).toRotationMatrix() * turned;
+}
+
+std::optional<Eigen::Vector2d> CameraModel::project_rolling(const Eigen::Vector3d& d_world,
                                                             double t0_s,
                                                             double inverse_distance) const {
   const Eigen::Vector3d parallax = inverse_distance * camera_.pupil;
   const auto seen_from_row = [&](double row) {
     const double time = t0_s + row * camera_.line_delay;
-    return lens_at(time).project(base_from_camera_at(time).transpose() * d_base - parallax);
+    return lens_at(time).project(world_from_camera_at(time).transpose() * d_world - parallax);
   };
   // The row that is exposed while the direction lies on it: the root of v(row) - row, by false position in which the end that
   // stays counts half (Illinois).

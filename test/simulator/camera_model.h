@@ -5,6 +5,7 @@
 //   orientation  R_base_from_camera = Rot(pan_axis, pan) Rot(tilt_axis, tilt) R_frd_from_rdf (PTCEE 16)
 //   lens         lens.h, about the image's centre unless stated; with a zoom that of each moment (zoom.h); its focal length
 //                breathes by a factor of the time
+//   mast         R_world_from_camera = Exp(sway(t)) R_base_from_camera; base and world are one where nothing sways
 //   pupil        a place at distance D in direction d of where the axes meet is seen along R^T d - pupil / D
 //   read-out     row coordinate v is exposed at t0 + v * line_delay, around that moment
 //
@@ -35,6 +36,10 @@ class CameraModel {
     return base_from_camera(path_->at(time_s));
   }
 
+  // What is seen lies in the world; what telemetry tells, in the base.
+  [[nodiscard]] Eigen::Matrix3d world_from_camera_at(double time_s) const;
+  [[nodiscard]] bool sways() const { return !camera_.sway.empty(); }
+
   [[nodiscard]] Lens lens_at(double time_s) const;
   [[nodiscard]] bool breathes() const { return camera_.breathing.part != 0; }
   // Null: the lens is always the same.
@@ -45,9 +50,9 @@ class CameraModel {
     return lens_.project(d_camera);
   }
 
-  // Where a direction in the base frame appears in the frame that starts at t0; nothing if on no row.
+  // Where a direction in the world frame appears in the frame that starts at t0; nothing if on no row.
   // inverse_distance: 1/m, from where the axes meet; 0: infinitely far.
-  [[nodiscard]] std::optional<Eigen::Vector2d> project_rolling(const Eigen::Vector3d& d_base,
+  [[nodiscard]] std::optional<Eigen::Vector2d> project_rolling(const Eigen::Vector3d& d_world,
                                                                double t0_s,
                                                                double inverse_distance = 0) const;
 

@@ -39,6 +39,17 @@ void read_camera(Section& section, bool zooms, CameraConfig* camera) {
   section.pair("tangential_distortion", &camera->tangential, 1);
   section.pair("centre_px", &camera->centre, 1);
   section.triple("pupil_cm", &camera->pupil, {-50, 50}, 1e-2);
+  section.list("sway", [&](Section& item) {
+    using Axis = Swing::Axis;
+    Swing swing;
+    item.choice<Axis>(
+        "axis", &swing.axis,
+        {{"forward", Axis::kForward}, {"right", Axis::kRight}, {"down", Axis::kDown}});
+    item.number("amplitude_mrad", &swing.amplitude, {0, 100}, kMilli);
+    item.number("frequency_hz", &swing.frequency, kNotNegative);
+    item.number("phase_deg", &swing.phase, kAny, kDegree);
+    camera->sway.push_back(swing);
+  });
   section.section("breathing", [&](Section& item) {
     using Type = Breathing::Type;
     item.choice<Type>("type", &camera->breathing.type,
@@ -127,13 +138,47 @@ void check_size(Section& section, const PatchConfig& patch, bool needs_height) {
   }
 }
 
+void read_clouds(Section& section, CloudsConfig* clouds) {
+  section.number("fraction", &clouds->fraction, kUnitInterval);
+  section.number("rate_deg_s", &clouds->rate, {0, 360}, kDegree);
+  section.number("rate_px_s", &clouds->rate_px, {0, 1e5});
+  section.number("heading_deg", &clouds->heading, kAny, kDegree);
+  section.number("size_px", &clouds->size_px, {8, 1e5});
+  section.number("brightness", &clouds->brightness, kUnitInterval);
+  section.number("contrast", &clouds->contrast, kUnitInterval);
+  section.number("above_deg", &clouds->above, {-90, 90}, kDegree);
+  if (clouds->rate > 0 && clouds->rate_px > 0) {
+    section.fail("clouds have rate_deg_s or rate_px_s, not both");
+  }
+}
+
+void read_water(Section& section, WaterConfig* water) {
+  section.number("below_deg", &water->below, {-90, 90}, kDegree);
+  section.number("rate_px_s", &water->rate_px, {0, 1e5});
+  section.number("size_px", &water->size_px, {8, 1e5});
+  section.number("brightness", &water->brightness, kUnitInterval);
+  section.number("contrast", &water->contrast, kUnitInterval);
+}
+
+void read_flutter(Section& section, PatchConfig* patch) {
+  section.section("flutter", [&](Section& item) {
+    FlutterConfig& flutter = patch->flutter.emplace();
+    item.number("rms_px", &flutter.rms_px, {0, 100});
+    item.number("size_px", &flutter.size_px, {4, 1e5});
+    item.number("rate_hz", &flutter.rate_hz, {0, 100});
+  });
+}
+
 void read_scene(Section& section, SceneConfig* scene) {
+  section.section("clouds", [&](Section& item) { read_clouds(item, &scene->clouds.emplace()); });
+  section.section("water", [&](Section& item) { read_water(item, &scene->water.emplace()); });
   section.number("background", &scene->background, kUnitInterval);
   section.number("detail", &scene->detail, kNotNegative);
   section.list("photos", [&](Section& item) {
     PatchConfig patch = read_direction(item);
     item.path("file", &patch.file);
     read_projection(item, &patch);
+    read_flutter(item, &patch);
     if (patch.file.empty()) item.fail("file is missing");
     check_size(item, patch, false);
     scene->photos.push_back(patch);
@@ -142,6 +187,7 @@ void read_scene(Section& section, SceneConfig* scene) {
     PatchConfig patch = read_direction(item);
     item.number("height_deg", &patch.height, kPositive, kDegree);
     read_projection(item, &patch);
+    read_flutter(item, &patch);
     check_size(item, patch, true);
     scene->procedural.push_back(patch);
   });
@@ -169,6 +215,13 @@ void read_sensor(Section& section, SensorConfig* sensor) {
   section.number("read_noise", &sensor->read_noise, kNotNegative);
   section.number("vignetting", &sensor->vignetting, kUnitInterval);
   section.number("boil_px", &sensor->boil, kNotNegative);
+  section.number("boil_length_px", &sensor->boil_length, {4, 1e5});
+  section.number("boil_time_s", &sensor->boil_time, {1e-3, 1e5});
+  section.number("noise_reduction", &sensor->noise_reduction, {0, 0.95});
+  section.section("sharpening", [&](Section& item) {
+    item.number("amount", &sensor->sharpening, {0, 5});
+    item.number("radius_px", &sensor->sharpening_radius, {0.3, 20});
+  });
   section.integer("jpeg_quality", &sensor->jpeg_quality, {1, 100});
   section.list("brightness_steps", [&](Section& item) {
     SensorConfig::Step step;
@@ -233,6 +286,17 @@ void read_timing(Section& section, TimingConfig* timing) {
                  kMicro);
 }
 
+void read_encoding(Section& section, EncodingConfig* encoding) {
+  section.choice<VideoCodec>(
+      "codec", &encoding->codec,
+      {{"mjpeg", VideoCodec::kMjpeg}, {"h264", VideoCodec::kH264}, {"h265", VideoCodec::kH265}});
+  section.integer("kbit_s", &encoding->kbit_s, {10, 1e6});
+  section.integer("gop", &encoding->gop, {1, 1e5});
+  if (encoding->codec == VideoCodec::kMjpeg && (encoding->kbit_s > 0 || encoding->gop > 0)) {
+    section.fail("kbit_s and gop need codec: h264 or h265");
+  }
+}
+
 void read_recording(Section& section, RecordingConfig* recording) {
   using Images = RecordingConfig::Images;
   section.choice<Images>("images", &recording->images,
@@ -240,17 +304,19 @@ void read_recording(Section& section, RecordingConfig* recording) {
                           {"png", Images::kPng},
                           {"pgm", Images::kPgm},
                           {"none", Images::kNone}});
+  read_encoding(section, &recording->encoding);
+  if (recording->images != Images::kVideo && recording->encoding.codec != VideoCodec::kMjpeg) {
+    section.fail("codec needs images: video");
+  }
   section.number("landmark_spacing", &recording->landmark_spacing, kPositive);
   section.number("pixel_sigma_px", &recording->pixel_sigma, kNotNegative);
   read_distance(section, "landmark_distance_m", false, &recording->landmark_distance);
 }
 
 void read_live(Section& section, LiveConfig* live) {
-  using Codec = LiveConfig::Codec;
   section.integer("rtsp_port", &live->rtsp_port, kPort);
   section.integer("http_port", &live->http_port, kPort);
-  section.choice<Codec>("codec", &live->codec,
-                        {{"mjpeg", Codec::kMjpeg}, {"h264", Codec::kH264}, {"h265", Codec::kH265}});
+  read_encoding(section, &live->encoding);
   section.text("rtp_host", &live->rtp_host);
   section.integer("rtp_port", &live->rtp_port, kPort);
   section.path("sdp_file", &live->sdp_file);
@@ -261,7 +327,7 @@ void read_live(Section& section, LiveConfig* live) {
   };
   optional_port("mjpeg_port", &live->mjpeg_port);
   optional_port("onvif_port", &live->onvif_port);
-  if (live->mjpeg_port && live->codec != Codec::kMjpeg) {
+  if (live->mjpeg_port && live->encoding.codec != VideoCodec::kMjpeg) {
     section.fail("mjpeg_port needs codec: mjpeg");
   }
   using Link = LiveConfig::Link;

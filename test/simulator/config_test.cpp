@@ -136,6 +136,16 @@ TEST_F(VirtualCameraConfig, NamesFileAndLineOfEveryMistake) {
            Mistake{"scene: {procedural: [{width_deg: 1, height_deg: 1, distance_m: {nearest: 9, "
                    "farthest: 3}}]}\n",
                    "camera.yaml:1: distance_m needs nearest, and farthest that is not less"},
+           Mistake{"live: {kbit_s: 500}\n",
+                   "camera.yaml:1: kbit_s and gop need codec: h264 or h265"},
+           Mistake{"recording: {images: png, codec: h264}\n",
+                   "camera.yaml:1: codec needs images: video"},
+           Mistake{"sensor: {noise_reduction: 0.99}\n",
+                   "camera.yaml:1: noise_reduction is 0.99, must be between 0 and 0.95"},
+           Mistake{"scene: {clouds: {rate_px_s: 1, rate_deg_s: 1}}\n",
+                   "camera.yaml:1: clouds have rate_deg_s or rate_px_s, not both"},
+           Mistake{"camera: {sway: [{axis: up}]}\n",
+                   "camera.yaml:1: axis must be one of: forward, right, down"},
            Mistake{"pattern: {}\nzoom: {}\n", "camera.yaml:1: a pattern is seen without zoom"},
            Mistake{"camera: {line_delay_us: 60}\n",
                    "camera.yaml:1: camera: reading out all rows (line_delay_us x height) outlasts "

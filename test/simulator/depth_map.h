@@ -4,8 +4,8 @@
 // The place that is in direction d from where the axes meet stands at distance D(d) from there. D is one number, or goes between
 // nearest and farthest as the place's own smooth noise does, by ratio; or it has so many layers. A ray p + s r (pupil p, unit
 // vector r, both in the patch's frame) meets the sphere of radius D where s D^-1 = t, t = sqrt(1 - e^2 + (e r)^2) - e r,
-// e = p / D: the direction seen is r + e / t. Smooth: D of the direction that is found, three times over (the shift is far smaller
-// than what D changes over). Layers: the nearest one that the ray meets where that layer or a nearer one is; behind a nearer one's
+// e = p / D: the direction seen is r + e / t. Smooth: D of the direction that is found, over and over until it stays (the shift must be
+// smaller than what D changes over). Layers: the nearest one that the ray meets where that layer or a nearer one is; behind a nearer one's
 // edge its own picture goes on. Thread-safe, no allocation.
 
 #include <Eigen/Core>
@@ -43,9 +43,10 @@ class DepthMap {
     };
     if (config_.layers == 0) {
       Eigen::Vector2d place = coordinates(r);
-      const int steps = config_.farthest > config_.nearest ? 3 : 1;
-      for (int step = 0; step < steps && !place.hasNaN(); ++step) {
-        place = met(inverse_distance(place));
+      for (int step = 0; step < kMostSteps && !place.hasNaN(); ++step) {
+        const Eigen::Vector2d before = place;
+        place = met(inverse_distance(before));
+        if ((place - before).squaredNorm() < kSettled) break;
       }
       return place;
     }
@@ -57,6 +58,9 @@ class DepthMap {
   }
 
  private:
+  static constexpr int kMostSteps = 12;
+  static constexpr double kSettled = 1e-16;  // rad^2
+
   // 0 = nearest, 1 = farthest.
   [[nodiscard]] double part(const Eigen::Vector2d& place) const {
     if (config_.farthest <= config_.nearest) return 0;

@@ -9,6 +9,10 @@
 
 namespace alidade::simulator {
 
+// Standard deviations of smooth_noise() in two and in three coordinates: (1/3 x 0.78355^n)^0.5.
+inline constexpr double kPlaneRms = 0.4524;
+inline constexpr double kSpaceRms = 0.4004;
+
 // Uniform in [-1, 1).
 inline double lattice_value(std::int64_t i, std::int64_t j, std::int64_t k, std::uint64_t seed) {
   const std::uint64_t place = static_cast<std::uint64_t>(i) * 0x9e3779b97f4a7c15u +

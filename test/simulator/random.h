@@ -23,7 +23,10 @@ enum class Stream : std::uint64_t {
   kTracks,
   kPeriods,
   kZoom,
-  kDepth
+  kDepth,
+  kClouds,
+  kWater,
+  kFlutter
 };
 
 // The finaliser of splitmix64 (Steele, Lea, Flood 2014): every input bit changes half the output.

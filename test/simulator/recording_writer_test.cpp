@@ -344,6 +344,42 @@ TEST_F(VirtualRecording, WritesVideoThatLibavReads) {
   avformat_close_input(&video);
 }
 
+TEST_F(VirtualRecording, KeepsVideoAtTheRateAskedFor) {
+  config_.image = {320, 240, 25};
+  config_.camera.focal_length = 1000;
+  config_.path.period = 20;
+  config_.duration = 5;
+  config_.sensor.read_noise = 6;
+  PatchConfig patch;
+  patch.width = patch.height = 1;
+  config_.scene.procedural = {patch};
+  config_.recording.images = RecordingConfig::Images::kVideo;
+  for (const auto codec : {VideoCodec::kH264, VideoCodec::kH265}) {
+    config_.recording.encoding = {codec, 800, 50};
+    const std::string folder = root_.path() + (codec == VideoCodec::kH264 ? "/h264" : "/h265");
+    write_recording(config_, folder);
+    const auto bytes = static_cast<double>(std::filesystem::file_size(folder + "/video.mkv"));
+    EXPECT_NEAR(bytes * 8 / 5 / 1000, 800, 160);
+    AVFormatContext* video = nullptr;
+    ASSERT_EQ(avformat_open_input(&video, (folder + "/video.mkv").c_str(), nullptr, nullptr), 0);
+    EXPECT_EQ(video->streams[0]->codecpar->codec_id,
+              codec == VideoCodec::kH264 ? AV_CODEC_ID_H264 : AV_CODEC_ID_HEVC);
+    EXPECT_GT(video->streams[0]->codecpar->extradata_size, 0);
+    AVPacket* packet = av_packet_alloc();
+    int frames = 0;
+    for (; av_read_frame(video, packet) >= 0; ++frames) {
+      EXPECT_EQ((packet->flags & AV_PKT_FLAG_KEY) != 0, frames % 50 == 0) << frames;
+      // In the order of capture: no B pictures.
+      EXPECT_NEAR(static_cast<double>(packet->pts) * av_q2d(video->streams[0]->time_base),
+                  frames / 25.0, 1e-3);
+      av_packet_unref(packet);
+    }
+    EXPECT_EQ(frames, 125);
+    av_packet_free(&packet);
+    avformat_close_input(&video);
+  }
+}
+
 TEST_F(VirtualRecording, WritesNumberedPictures) {
   for (const auto& [images, extension] : {std::pair(RecordingConfig::Images::kPng, "png"),
                                           std::pair(RecordingConfig::Images::kPgm, "pgm")}) {

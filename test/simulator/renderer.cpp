@@ -13,8 +13,10 @@ namespace {
 
 constexpr int kMostExposures = 64;
 constexpr int kWaves = 24;
+constexpr int kSpectrumWaves = 96;  // where correlation is to be as asked for
 // Boil is evaluated at every so many columns, and is linear in between.
 constexpr int kBoilStep = 16;
+constexpr int kBoilStepsPerLength = 4;
 constexpr double kCoveredLight = 0.02;  // what comes through a lens cover
 // Where in a pixel each sub-exposure looks, in the order of time. Opposite points come at opposite
 // times, so that the blur of a moving edge is symmetric; in the larger set, used when motion is to be
@@ -65,7 +67,7 @@ std::vector<Sight> all_sights(const Config& config, const Path& path, const Came
   const Eigen::Vector3d parallax = camera.pupil() * largest_inverse_distance(config.scene);
   for (int i = 0; i <= times; ++i) {
     const double time = length * i / times;
-    const Eigen::Matrix3d turn = camera.base_from_camera_at(time);
+    const Eigen::Matrix3d turn = camera.world_from_camera_at(time);
     const Lens lens = camera.lens_at(time);
     for (int row = 0; row <= kGrid; ++row) {
       for (int column = 0; column <= kGrid; ++column) {
@@ -95,27 +97,41 @@ Renderer::Renderer(const Config& config, const Path& path)
       scene_(config.scene, all_sights(config, path, camera_), camera_.zoom() != nullptr,
              config.seed),
       noise_(config.sensor, config.seed) {
+  const double length = config.sensor.boil_length;
+  const double time = config.sensor.boil_time;
+  boil_step_ = length > 0 ? std::clamp(static_cast<int>(length / kBoilStepsPerLength), 1, kBoilStep)
+                          : kBoilStep;
   if (config.sensor.boil > 0) {
     std::mt19937_64 generator = make_generator(config.seed, Stream::kBoil);
     std::normal_distribution<double> normal;
     std::uniform_real_distribution<double> turn(0, kTwoPi);
     std::uniform_real_distribution<double> pace(0.5, 1.5);
-    for (int i = 0; i < kWaves; ++i) {
+    const int waves = length > 0 || time > 0 ? kSpectrumWaves : kWaves;
+    const double per_px = length > 0 ? 1 / length : kTwoPi / (0.2 * config.image.width);
+    for (int i = 0; i < waves; ++i) {
       // A sum of n waves of amplitude a, in directions all round, has a variance of n a^2 / 4 along
       // each axis.
-      const double angle = kTwoPi * i / kWaves;
-      const double amplitude = config.sensor.boil * std::sqrt(4.0 / kWaves);
-      waves_.push_back({kTwoPi / (0.2 * config.image.width) * normal(generator),
-                        kTwoPi / (0.2 * config.image.width) * normal(generator),
-                        kTwoPi / 0.5 * pace(generator), turn(generator),
+      const double angle = kTwoPi * i / waves;
+      const double amplitude = config.sensor.boil * std::sqrt(4.0 / waves);
+      waves_.push_back({per_px * normal(generator), per_px * normal(generator),
+                        time > 0 ? normal(generator) / time : kTwoPi / 0.5 * pace(generator),
+                        turn(generator),
                         amplitude * Eigen::Vector2d(std::cos(angle), std::sin(angle))});
     }
   }
 }
 
 bool Renderer::steady() const {
-  return !camera_.breathes() && config_.sensor.boil == 0 && config_.scene.moving.empty() &&
-         config_.sensor.brightness_steps.empty() && config_.sensor.covered.empty();
+  const auto still = [](const PatchConfig& patch) { return !patch.flutter; };
+  const SceneConfig& scene = config_.scene;
+  if (scene.clouds || scene.water ||
+      !std::all_of(scene.photos.begin(), scene.photos.end(), still) ||
+      !std::all_of(scene.procedural.begin(), scene.procedural.end(), still)) {
+    return false;
+  }
+  return !camera_.breathes() && !camera_.sways() && config_.sensor.boil == 0 &&
+         config_.scene.moving.empty() && config_.sensor.brightness_steps.empty() &&
+         config_.sensor.covered.empty();
 }
 
 Eigen::Vector2d Renderer::boil(double u, double v, double time_s) const {
@@ -132,12 +148,13 @@ void Renderer::rays_of_row(const Lens& lens, double v, double offset_u, double t
   Eigen::Vector2d left = Eigen::Vector2d::Zero();
   Eigen::Vector2d right = boil(0, v, time_s);
   for (int column = 0; column < config_.image.width; ++column) {
-    const int within = column % kBoilStep;
+    const int within = column % boil_step_;
     if (within == 0) {
       left = right;
-      right = boil(column + kBoilStep, v, time_s);
+      right = boil(column + boil_step_, v, time_s);
     }
-    const Eigen::Vector2d shift = left + (right - left) * (within / double{kBoilStep});
+    const Eigen::Vector2d shift =
+        left + (right - left) * (within / static_cast<double>(boil_step_));
     const double u = column + 0.5 + offset_u + shift.x();
     const Eigen::Vector2d slope = camera_.slope_of(lens, u, v + shift.y());
     (*x)[static_cast<std::size_t>(column)] = slope.x();
@@ -165,8 +182,8 @@ std::vector<std::uint8_t> Renderer::render(double t0_s, std::int64_t sequence) c
   const double readout = height * config_.camera.line_delay;
   const double opens = t0_s + readout / 2 - sensor.exposure / 2;
   const double closes = t0_s + readout / 2 + sensor.exposure / 2;
-  const Eigen::Matrix3d before = camera_.base_from_camera_at(opens);
-  const Eigen::Matrix3d after = camera_.base_from_camera_at(closes);
+  const Eigen::Matrix3d before = camera_.world_from_camera_at(opens);
+  const Eigen::Matrix3d after = camera_.world_from_camera_at(closes);
   const double focal_length = camera_.lens_at(closes).focal_length;
   // The norm of a difference of rotations by the small angle a is sqrt(2) a. Zooming is fastest in the corners.
   const double blur = focal_length * (after - before).norm() / std::sqrt(2.0) +
@@ -193,7 +210,7 @@ std::vector<std::uint8_t> Renderer::render(double t0_s, std::int64_t sequence) c
                                              : kPointsInMotion.at(static_cast<std::size_t>(i % 8));
       const Lens lens = camera_.lens_at(time);
       rays_of_row(lens, v + offset_v, offset_u, time, &x, &y);
-      scene_.shade(camera_.base_from_camera_at(time), camera_.pupil(), time, lens.focal_length,
+      scene_.shade(camera_.world_from_camera_at(time), camera_.pupil(), time, lens.focal_length,
                    x.data(), y.data(), row_size, 1.0F / static_cast<float>(exposures),
                    signal.data());
     }

@@ -315,12 +315,12 @@ TEST_F(VirtualSensor, HidesAFarPatchBehindANearOneWhateverTheirOrder) {
 }
 
 TEST(VirtualDepth, WhatIsSeenStandsWhereItsDistanceHasIt) {
-  const Eigen::Vector3d pupil(0.1, -0.05, 0.2);
+  const Eigen::Vector3d pupil(0.04, -0.03, 0.1);
   const auto coordinates = [](const Eigen::Vector3d& v) {
     return Eigen::Vector2d(v.x() / v.z(), v.y() / v.z());
   };
   for (const int layers : {0, 4}) {
-    const DepthMap depth({3, 60, layers, 0.05}, 7);
+    const DepthMap depth({6, 120, layers, 0.1}, 7);
     double nearest = 1e9;
     double farthest = 0;
     int exact = 0;
@@ -333,13 +333,13 @@ TEST(VirtualDepth, WhatIsSeenStandsWhereItsDistanceHasIt) {
       farthest = std::max(farthest, distance);
       const Eigen::Vector3d from_pupil = distance * place.homogeneous().normalized() - pupil;
       const double off = from_pupil.normalized().cross(ray.normalized()).norm();
-      if (off < 1e-4) ++exact;
+      if (off < 1e-6) ++exact;
       // What is hidden behind an edge is seen as part of the layer behind: then it is nearer by its place.
-      if (layers == 0) EXPECT_LT(off, 1e-3);
+      if (layers == 0) EXPECT_LT(off, 1e-5);
     }
     EXPECT_GT(exact, kRays * 9 / 10) << layers;
-    EXPECT_LT(nearest, 5);
-    EXPECT_GT(farthest, 30);
+    EXPECT_LT(nearest, 10);
+    EXPECT_GT(farthest, 60);
   }
 }
 

@@ -10,6 +10,7 @@
 #include <optional>
 #include <string>
 
+#include "test/simulator/noise_field.h"
 #include "test/simulator/random.h"
 
 namespace alidade::simulator {
@@ -101,7 +102,18 @@ Eigen::Vector3d direction(double azimuth, double elevation) {
 
 Scene::Scene(const SceneConfig& config, const std::vector<Sight>& sights, bool zooms,
              std::uint64_t seed)
-    : background_(static_cast<float>(config.background)), zooms_(zooms) {
+    : background_(static_cast<float>(config.background)),
+      longest_focal_length_(sights.front().focal_length),
+      flutter_seed_(mix(seed, static_cast<std::uint64_t>(Stream::kFlutter))),
+      zooms_(zooms) {
+  if (config.clouds) {
+    clouds_.emplace(*config.clouds, longest_focal_length_,
+                    mix(seed, static_cast<std::uint64_t>(Stream::kClouds)));
+  }
+  if (config.water) {
+    water_.emplace(*config.water, longest_focal_length_,
+                   mix(seed, static_cast<std::uint64_t>(Stream::kWater)));
+  }
   for (const PatchConfig& moving : config.moving) {
     add_object(moving, object_picture(moving.brightness));
   }
@@ -213,6 +225,34 @@ float Scene::zoomed_sample(const Patch& patch, std::size_t layer, double level,
   return value + part * (coarse.texture.sample(other.x(), other.y(), 0) - value);
 }
 
+void Scene::add_clouds_and_water(const Eigen::Matrix3d& base_from_camera, double time_s,
+                                 const double* x, const double* y, std::size_t size, float* shine,
+                                 float* open) const {
+  for (std::size_t i = 0; i < size; ++i) {
+    const Eigen::Vector3d ray = base_from_camera * Eigen::Vector3d(x[i], y[i], 1);
+    if (ray.hasNaN()) continue;
+    const double azimuth = std::atan2(ray.y(), ray.x());
+    const double elevation = -std::atan2(ray.z(), std::hypot(ray.x(), ray.y()));
+    const auto take = [&](const Cover& it) {
+      shine[i] += open[i] * it.part * it.brightness;
+      open[i] *= 1 - it.part;
+    };
+    if (clouds_) take(clouds_->at(azimuth, elevation, time_s));
+    if (water_ && open[i] > 0) take(water_->at(azimuth, elevation, time_s));
+  }
+}
+
+void Scene::flutter(const FlutterConfig& config, double time_s, std::uint64_t seed, double* right,
+                    double* down) const {
+  const double per_size = longest_focal_length_ / config.size_px;
+  const double scale = config.rms_px / longest_focal_length_ / kSpaceRms;
+  const double x = *right * per_size;
+  const double y = *down * per_size;
+  const double time = time_s * config.rate_hz;
+  *right += scale * smooth_noise(x, y, time, seed);
+  *down += scale * smooth_noise(x, y, time, seed + 1);
+}
+
 void Scene::shade(const Eigen::Matrix3d& base_from_camera, const Eigen::Vector3d& pupil,
                   double time_s, double focal_length, const double* x, const double* y,
                   std::size_t count, float weight, float* sum) const {
@@ -230,6 +270,10 @@ void Scene::shade(const Eigen::Matrix3d& base_from_camera, const Eigen::Vector3d
     const std::size_t size = std::min(kBlock, count - start);
     shine.fill(0);
     open.fill(1);
+    if (clouds_ || water_) {
+      add_clouds_and_water(base_from_camera, time_s, x + start, y + start, size, shine.data(),
+                           open.data());
+    }
     for (std::size_t n = 0; n < patches_.size(); ++n) {
       const Patch& patch = patches_[n];
       const Eigen::Matrix3d& turn = patch_from_camera[n];
@@ -260,6 +304,12 @@ void Scene::shade(const Eigen::Matrix3d& base_from_camera, const Eigen::Vector3d
         most = std::max(most, cover[i]);
       }
       if (most == 0) continue;
+      if (patch.config.flutter) {
+        for (std::size_t i = 0; i < size; ++i) {
+          if (cover[i] > 0)
+            flutter(*patch.config.flutter, time_s, mix(flutter_seed_, n), &right[i], &down[i]);
+        }
+      }
       std::size_t number = 0;
       if (patch.layers.size() > 1) {
         Eigen::AlignedBox2d box;

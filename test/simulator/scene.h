@@ -1,7 +1,7 @@
 #pragma once
 // The far scene around the virtual camera: patches on the sphere, the first in front.
 //
-// Order: moving objects, flat areas, photos, procedural patches, background. A patch is centred on a
+// Order: clouds, water, moving objects, flat areas, photos, procedural patches, background. A patch is centred on a
 // direction (azimuth positive right, elevation positive up; in base, FRD:
 // (cos e cos a, cos e sin a, -sin e)), upright there, and mapped either rectilinearly (tangent plane)
 // or by longitude and latitude about its own centre. Borders are soft over one pixel.
@@ -18,6 +18,7 @@
 #include <optional>
 #include <vector>
 
+#include "test/simulator/clouds.h"
 #include "test/simulator/config.h"
 #include "test/simulator/depth_map.h"
 #include "test/simulator/texture.h"
@@ -74,7 +75,19 @@ class Scene {
   [[nodiscard]] static float zoomed_sample(const Patch& patch, std::size_t layer, double level,
                                            const Eigen::Vector2d& point);
 
+  // Clouds and water take what they cover of the block's rays.
+  void add_clouds_and_water(const Eigen::Matrix3d& base_from_camera, double time_s, const double* x,
+                            const double* y, std::size_t size, float* shine, float* open) const;
+
+  // Shifts a place of a patch, in patch coordinates.
+  void flutter(const FlutterConfig& config, double time_s, std::uint64_t seed, double* right,
+               double* down) const;
+
   float background_;
+  std::optional<Clouds> clouds_;
+  std::optional<Water> water_;
+  double longest_focal_length_;  // px
+  std::uint64_t flutter_seed_;
   bool zooms_;
   std::vector<Patch> patches_;
 };

@@ -57,7 +57,7 @@ std::vector<TrackedPoint> make_tracks(const Config& config, const std::vector<Fr
     const double reach =
         0.55 * std::atan2(std::hypot(config.image.width, config.image.height), focal_length) +
         2 * spacing;
-    const Eigen::Vector3d axis = camera.base_from_camera_at(event.capture_s).col(2);
+    const Eigen::Vector3d axis = camera.world_from_camera_at(event.capture_s).col(2);
     const double azimuth = std::atan2(axis.y(), axis.x());
     const double elevation = -std::asin(std::clamp(axis.z(), -1.0, 1.0));
     const auto row_of = [&](double angle) {

@@ -1,6 +1,7 @@
 #include "test/simulator/truth.h"
 
 #include <Eigen/Geometry>
+#include <array>
 #include <iomanip>
 #include <sstream>
 #include <stdexcept>
@@ -72,6 +73,15 @@ void write_departures(const Config& config, std::ofstream& out) {
   if (!camera.tangential.isZero(0)) {
     lines << "  tangential_distortion: [" << camera.tangential.x() << ", " << camera.tangential.y()
           << "]\n";
+  }
+  if (!camera.sway.empty()) {
+    constexpr std::array<const char*, 3> kAxes{"forward", "right", "down"};
+    lines << "  sway:\n";
+    for (const Swing& swing : camera.sway) {
+      lines << "    - {axis: " << kAxes.at(static_cast<std::size_t>(swing.axis))
+            << ", amplitude: " << swing.amplitude << ", frequency: " << swing.frequency
+            << ", phase: " << swing.phase << "}\n";
+    }
   }
   if (!camera.pupil.isZero(0)) {
     lines << "  pupil: [" << camera.pupil.x() << ", " << camera.pupil.y() << ", "
@@ -153,7 +163,8 @@ TruthCsv::TruthCsv(const std::filesystem::path& file, const CameraModel& camera)
   file_.stream() << "frame,time_s,pan_rad,tilt_rad,sequence,sender_time_s,stamp_time_s"
                  << (tells_lens_ ? ",focal_length_px,radial_distortion,centre_u_px,centre_v_px"
                                  : "")
-                 << (camera.zoom() != nullptr ? ",zoom" : "") << '\n';
+                 << (camera.zoom() != nullptr ? ",zoom" : "")
+                 << (camera.sways() ? ",q_x,q_y,q_z,q_w" : "") << '\n';
 }
 
 void TruthCsv::add(const FrameEvent& event, const Angles& angles, double origin_s) {
@@ -167,6 +178,10 @@ void TruthCsv::add(const FrameEvent& event, const Angles& angles, double origin_
         << ',' << lens.centre.y();
   }
   if (const Zoom* zoom = camera_->zoom()) out << ',' << zoom->reading(event.capture_s);
+  if (camera_->sways()) {
+    const Eigen::Quaterniond q(camera_->world_from_camera_at(event.capture_s));
+    out << ',' << q.x() << ',' << q.y() << ',' << q.z() << ',' << q.w();
+  }
   out << '\n';
 }
 

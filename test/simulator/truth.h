@@ -11,6 +11,8 @@
 //   sender_time_s       the same moment on the sender's own, perhaps skewed clock
 //   stamp_time_s        recording: the stamp in frames.csv; live: when the frame is handed out
 //   focal_length_px, radial_distortion, centre_u_px, centre_v_px   with a zoom or where it breathes: the true lens at that time
+//   q_x, q_y, q_z, q_w   where the mast sways: the camera's true orientation in the world (R_world_from_camera) at that time; pan and
+//                tilt are then those of the head in its base
 //   zoom         with a zoom: the true reading, between steps too
 // With a zoom truth.yaml tells the lens at time 0, its reading (zoom), and besides zoom_samples, a list over the whole range of what
 // the lens is at a reading (zoom, focal_length, radial_distortion, centre_offset) if it comes back exactly.
