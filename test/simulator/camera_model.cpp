@@ -31,10 +31,10 @@ CameraModel::CameraModel(const CameraConfig& camera, const ImageConfig& image, c
       path_(&path),
       zoom_(std::move(zoom)),
       lens_(zoom_ ? zoom_->lens(0)
-                  : Lens{camera.focal_length,
-                         camera.aspect,
-                         camera.radial_distortion,
-                         {image.width / 2.0, image.height / 2.0}}),
+                  : Lens{camera.focal_length, camera.aspect, camera.radial_distortion,
+                         camera.centre + Eigen::Vector2d(image.width, image.height) / 2,
+                         camera.radial_distortion_2, camera.tangential}),
+      tangential_(!lens_.tangential.isZero(0)),
       per_focal_(
           Eigen::Vector2d(lens_.focal_length, lens_.focal_length * lens_.aspect).cwiseInverse()),
       pan_axis_(tilted(Eigen::Vector3d::UnitZ(), Eigen::Vector3d::UnitX(), Eigen::Vector3d::UnitY(),
@@ -42,15 +42,19 @@ CameraModel::CameraModel(const CameraConfig& camera, const ImageConfig& image, c
       tilt_axis_(tilted(Eigen::Vector3d::UnitY(), Eigen::Vector3d::UnitX(),
                         Eigen::Vector3d::UnitZ(), camera.tilt_axis_offset)) {
   const double k = lens_.radial_distortion;
+  const double k2 = lens_.radial_distortion_2;
   // The corner that is farthest from the optical centre.
   const Eigen::Vector2d size(image.width, image.height);
   const Eigen::Vector2d farthest = lens_.centre.cwiseMax(size - lens_.centre);
   const double corner_squared = (farthest.cwiseQuotient(Eigen::Vector2d(
                                      lens_.focal_length, lens_.focal_length * lens_.aspect)))
                                     .squaredNorm();
-  // At the largest slope the distorted radius is 2/3 of it.
-  const double largest_squared =
-      std::min(corner_squared * kTableMargin, lens_.largest_slope_squared() * 4 / 9);
+  // At the largest slope the distorted radius is 2/3 of it where there is no k2.
+  const double fold = lens_.largest_slope_squared();
+  const double shrunk = k2 == 0 ? 4.0 / 9 : lens_.radial(fold) * lens_.radial(fold);
+  const double largest_squared = std::isfinite(fold)
+                                     ? std::min(corner_squared * kTableMargin, fold * shrunk)
+                                     : corner_squared * kTableMargin;
   samples_per_square_ = static_cast<double>(kTableSize - 1) / largest_squared;
   shrink_.reserve(kTableSize);
   double slope = 0;
@@ -58,13 +62,25 @@ CameraModel::CameraModel(const CameraConfig& camera, const ImageConfig& image, c
     const double radius = std::sqrt(static_cast<double>(i) / samples_per_square_);
     // Newton from the previous entry; near the fold (k < 0) it converges slowly, hence the count.
     for (int step = 0; step < 60; ++step) {
-      const double derivative = 1 + 3 * k * slope * slope;
-      const double excess = slope + k * slope * slope * slope - radius;
+      const double fourth = k2 * slope * slope * slope * slope;
+      const double derivative = 1 + 3 * k * slope * slope + 5 * fourth;
+      const double excess = slope + k * slope * slope * slope + fourth * slope - radius;
       if (derivative < 1e-9 || std::abs(excess) < 1e-16) break;
       slope -= excess / derivative;
     }
     shrink_.push_back(radius > 0 ? slope / radius : 1);
   }
+}
+
+Lens CameraModel::lens_at(double time_s) const {
+  Lens lens = zoom_ ? zoom_->lens(time_s) : lens_;
+  const Breathing& breathing = camera_.breathing;
+  if (breathing.part == 0) return lens;
+  const double periods = time_s / breathing.period;
+  lens.focal_length *= 1 + breathing.part * (breathing.type == Breathing::Type::kLinear
+                                                 ? std::clamp(periods, 0.0, 1.0)
+                                                 : std::sin(kTwoPi * periods) / 2);
+  return lens;
 }
 
 Eigen::Matrix3d CameraModel::base_from_camera(const Angles& angles) const {
@@ -74,11 +90,26 @@ Eigen::Matrix3d CameraModel::base_from_camera(const Angles& angles) const {
          Eigen::AngleAxisd(angles.tilt, tilt_axis_).toRotationMatrix() * base_from_rdf;
 }
 
-std::optional<Eigen::Vector2d> CameraModel::project_rolling(const Eigen::Vector3d& d_base,
-                                                            double t0_s) const {
+Eigen::Matrix3d CameraModel::world_from_camera_at(double time_s) const {
+  const Eigen::Matrix3d turned = base_from_camera_at(time_s);
+  if (!sways()) return turned;
+  Eigen::Vector3d sway = Eigen::Vector3d::Zero();
+  for (const Swing& swing : camera_.sway) {
+    sway[static_cast<int>(swing.axis)] +=
+        swing.amplitude * std::sin(kTwoPi * swing.frequency * time_s + swing.phase);
+  }
+  const double angle = sway.norm();
+  if (angle == 0) return turned;
+  return Eigen::AngleAxisd(angle, sway / angle).toRotationMatrix() * turned;
+}
+
+std::optional<Eigen::Vector2d> CameraModel::project_rolling(const Eigen::Vector3d& d_world,
+                                                            double t0_s,
+                                                            double inverse_distance) const {
+  const Eigen::Vector3d parallax = inverse_distance * camera_.pupil;
   const auto seen_from_row = [&](double row) {
     const double time = t0_s + row * camera_.line_delay;
-    return lens_at(time).project(base_from_camera_at(time).transpose() * d_base);
+    return lens_at(time).project(world_from_camera_at(time).transpose() * d_world - parallax);
   };
   // The row that is exposed while the direction lies on it: the root of v(row) - row, by false position in which the end that
   // stays counts half (Illinois).

@@ -93,6 +93,70 @@ TEST(VirtualCameraModel, RayOfAPixelProjectsBackOntoIt) {
   EXPECT_EQ(checked, 5 * 99 * 56);
 }
 
+// Brown's formula, written out for one place.
+TEST(VirtualCameraModel, BendsByAllTermsAboutItsOwnCentre) {
+  CameraConfig camera;
+  camera.focal_length = 800;
+  camera.aspect = 1.01;
+  camera.radial_distortion = -0.2;
+  camera.radial_distortion_2 = 0.07;
+  camera.tangential = {3e-3, -2e-3};
+  camera.centre = {10, -8};
+  const Still path;
+  const CameraModel model(camera, ImageConfig{}, path);
+  const double x = 0.4;
+  const double y = -0.3;
+  const double s = 1 - 0.2 * 0.25 + 0.07 * 0.0625;
+  const double bent_x = x * s + 2 * 3e-3 * x * y - 2e-3 * (0.25 + 2 * 0.16);
+  const double bent_y = y * s + 3e-3 * (0.25 + 2 * 0.09) - 2 * 2e-3 * x * y;
+  const Eigen::Vector2d pixel = model.project({2 * x, 2 * y, 2}).value();
+  EXPECT_NEAR(pixel.x(), 650 + 800 * bent_x, 1e-9);
+  EXPECT_NEAR(pixel.y(), 352 + 808 * bent_y, 1e-9);
+}
+
+TEST(VirtualCameraModel, RayOfAPixelProjectsBackOntoItWithAllTerms) {
+  for (const double k2 : {-0.03, 0.04, 0.4}) {
+    for (const double p : {0.0, 2e-3}) {
+      CameraConfig camera;
+      camera.focal_length = 1000;
+      camera.radial_distortion = -0.15;
+      camera.radial_distortion_2 = k2;
+      camera.tangential = {p, -p / 2};
+      camera.centre = {-30, 12};
+      const Still path;
+      const CameraModel model(camera, ImageConfig{}, path);
+      for (double u = 0.5; u <= 1279.5; u += 57) {
+        for (double v = 0.5; v <= 719.5; v += 57) {
+          const Eigen::Vector2d slope = model.slope(u, v);
+          const auto pixel = model.project(slope.homogeneous());
+          ASSERT_TRUE(pixel.has_value()) << "k2 " << k2 << " u " << u << " v " << v;
+          EXPECT_LT((*pixel - Eigen::Vector2d(u, v)).norm(), 1e-4);
+          EXPECT_LT((model.lens_at(0).slope(u, v) - slope).norm(), 1e-7);
+        }
+      }
+    }
+  }
+}
+
+TEST(VirtualCameraModel, BreathesByItsPartAsTheTimeGoes) {
+  CameraConfig camera;
+  camera.radial_distortion = 0.1;
+  camera.breathing = {Breathing::Type::kLinear, 2e-3, 10};
+  const Still path;
+  const CameraModel drifts(camera, ImageConfig{}, path);
+  EXPECT_EQ(drifts.lens_at(-1).focal_length, 1500);
+  EXPECT_NEAR(drifts.lens_at(5).focal_length, 1501.5, 1e-9);
+  EXPECT_NEAR(drifts.lens_at(12).focal_length, 1503, 1e-9);
+  camera.breathing = {Breathing::Type::kSine, 2e-3, 10};
+  const CameraModel swings(camera, ImageConfig{}, path);
+  EXPECT_NEAR(swings.lens_at(2.5).focal_length, 1501.5, 1e-9);
+  EXPECT_NEAR(swings.lens_at(7.5).focal_length, 1498.5, 1e-9);
+  // Rendered rays and projected places are of the same lens.
+  const Eigen::Vector2d slope = swings.slope_at(1200.5, 20.5, 2.5);
+  const auto pixel = swings.lens_at(2.5).project(slope.homogeneous());
+  EXPECT_LT((pixel.value() - Eigen::Vector2d(1200.5, 20.5)).norm(), 1e-4);
+}
+
 TEST(VirtualCameraModel, SeesNothingBeyondTheFoldOfTheLens) {
   CameraConfig camera;
   camera.focal_length = 800;

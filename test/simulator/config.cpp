@@ -17,6 +17,8 @@ constexpr double kPi = 3.14159265358979323846;
 constexpr double kDegree = kPi / 180;
 constexpr double kMilli = 1e-3;
 constexpr double kMicro = 1e-6;
+constexpr Range kDistance{0.6, 1e6};  // more than the pupil may be off
+
 void read_image(Section& section, ImageConfig* image) {
   section.integer("width", &image->width, {16, 16384});
   section.integer("height", &image->height, {16, 16384});
@@ -24,7 +26,8 @@ void read_image(Section& section, ImageConfig* image) {
 }
 
 void read_camera(Section& section, bool zooms, CameraConfig* camera) {
-  for (const char* key : {"focal_length_px", "radial_distortion"}) {
+  for (const char* key : {"focal_length_px", "radial_distortion", "radial_distortion_2",
+                          "tangential_distortion", "centre_px"}) {
     if (zooms && section.has(key)) {
       section.fail(std::string(key) + " belongs to a lens without zoom: zoom has its own");
     }
@@ -32,6 +35,28 @@ void read_camera(Section& section, bool zooms, CameraConfig* camera) {
   section.number("focal_length_px", &camera->focal_length, kPositive);
   section.number("aspect", &camera->aspect, kPositive);
   section.number("radial_distortion", &camera->radial_distortion);
+  section.number("radial_distortion_2", &camera->radial_distortion_2);
+  section.pair("tangential_distortion", &camera->tangential, 1);
+  section.pair("centre_px", &camera->centre, 1);
+  section.triple("pupil_cm", &camera->pupil, {-50, 50}, 1e-2);
+  section.list("sway", [&](Section& item) {
+    using Axis = Swing::Axis;
+    Swing swing;
+    item.choice<Axis>(
+        "axis", &swing.axis,
+        {{"forward", Axis::kForward}, {"right", Axis::kRight}, {"down", Axis::kDown}});
+    item.number("amplitude_mrad", &swing.amplitude, {0, 100}, kMilli);
+    item.number("frequency_hz", &swing.frequency, kNotNegative);
+    item.number("phase_deg", &swing.phase, kAny, kDegree);
+    camera->sway.push_back(swing);
+  });
+  section.section("breathing", [&](Section& item) {
+    using Type = Breathing::Type;
+    item.choice<Type>("type", &camera->breathing.type,
+                      {{"linear", Type::kLinear}, {"sine", Type::kSine}});
+    item.number("part", &camera->breathing.part, {-0.05, 0.05});
+    item.number("period_s", &camera->breathing.period, kPositive);
+  });
   section.number("line_delay_us", &camera->line_delay, kAny, kMicro);
   section.pair("pan_axis_mrad", &camera->pan_axis_offset, kMilli);
   section.pair("tilt_axis_mrad", &camera->tilt_axis_offset, kMilli);
@@ -62,11 +87,35 @@ void read_path(Section& section, PathConfig* path) {
   }
 }
 
+// A number, or nearest and farthest.
+void read_distance(Section& section, const char* key, bool map,
+                   std::optional<DistanceConfig>* distance) {
+  if (!section.has(key)) return;
+  DistanceConfig& given = distance->emplace();
+  if (!section.is_section(key)) {
+    section.number(key, &given.nearest, kDistance);
+    given.farthest = given.nearest;
+    return;
+  }
+  section.section(key, [&](Section& item) {
+    item.number("nearest", &given.nearest, kDistance);
+    item.number("farthest", &given.farthest, kDistance);
+    if (map) {
+      item.integer("layers", &given.layers, {0, 16});
+      item.number("length_deg", &given.length, {0.01, 180}, kDegree);
+    }
+    if (given.nearest == 0 || given.farthest < given.nearest) {
+      item.fail(std::string(key) + " needs nearest, and farthest that is not less");
+    }
+  });
+}
+
 PatchConfig read_direction(Section& section) {
   PatchConfig patch;
   section.number("azimuth_deg", &patch.azimuth, kAny, kDegree);
   section.number("elevation_deg", &patch.elevation, {-90, 90}, kDegree);
   section.number("width_deg", &patch.width, kPositive, kDegree);
+  read_distance(section, "distance_m", true, &patch.distance);
   return patch;
 }
 
@@ -89,13 +138,47 @@ void check_size(Section& section, const PatchConfig& patch, bool needs_height) {
   }
 }
 
+void read_clouds(Section& section, CloudsConfig* clouds) {
+  section.number("fraction", &clouds->fraction, kUnitInterval);
+  section.number("rate_deg_s", &clouds->rate, {0, 360}, kDegree);
+  section.number("rate_px_s", &clouds->rate_px, {0, 1e5});
+  section.number("heading_deg", &clouds->heading, kAny, kDegree);
+  section.number("size_px", &clouds->size_px, {8, 1e5});
+  section.number("brightness", &clouds->brightness, kUnitInterval);
+  section.number("contrast", &clouds->contrast, kUnitInterval);
+  section.number("above_deg", &clouds->above, {-90, 90}, kDegree);
+  if (clouds->rate > 0 && clouds->rate_px > 0) {
+    section.fail("clouds have rate_deg_s or rate_px_s, not both");
+  }
+}
+
+void read_water(Section& section, WaterConfig* water) {
+  section.number("below_deg", &water->below, {-90, 90}, kDegree);
+  section.number("rate_px_s", &water->rate_px, {0, 1e5});
+  section.number("size_px", &water->size_px, {8, 1e5});
+  section.number("brightness", &water->brightness, kUnitInterval);
+  section.number("contrast", &water->contrast, kUnitInterval);
+}
+
+void read_flutter(Section& section, PatchConfig* patch) {
+  section.section("flutter", [&](Section& item) {
+    FlutterConfig& flutter = patch->flutter.emplace();
+    item.number("rms_px", &flutter.rms_px, {0, 100});
+    item.number("size_px", &flutter.size_px, {4, 1e5});
+    item.number("rate_hz", &flutter.rate_hz, {0, 100});
+  });
+}
+
 void read_scene(Section& section, SceneConfig* scene) {
+  section.section("clouds", [&](Section& item) { read_clouds(item, &scene->clouds.emplace()); });
+  section.section("water", [&](Section& item) { read_water(item, &scene->water.emplace()); });
   section.number("background", &scene->background, kUnitInterval);
   section.number("detail", &scene->detail, kNotNegative);
   section.list("photos", [&](Section& item) {
     PatchConfig patch = read_direction(item);
     item.path("file", &patch.file);
     read_projection(item, &patch);
+    read_flutter(item, &patch);
     if (patch.file.empty()) item.fail("file is missing");
     check_size(item, patch, false);
     scene->photos.push_back(patch);
@@ -104,6 +187,7 @@ void read_scene(Section& section, SceneConfig* scene) {
     PatchConfig patch = read_direction(item);
     item.number("height_deg", &patch.height, kPositive, kDegree);
     read_projection(item, &patch);
+    read_flutter(item, &patch);
     check_size(item, patch, true);
     scene->procedural.push_back(patch);
   });
@@ -131,6 +215,13 @@ void read_sensor(Section& section, SensorConfig* sensor) {
   section.number("read_noise", &sensor->read_noise, kNotNegative);
   section.number("vignetting", &sensor->vignetting, kUnitInterval);
   section.number("boil_px", &sensor->boil, kNotNegative);
+  section.number("boil_length_px", &sensor->boil_length, {4, 1e5});
+  section.number("boil_time_s", &sensor->boil_time, {1e-3, 1e5});
+  section.number("noise_reduction", &sensor->noise_reduction, {0, 0.95});
+  section.section("sharpening", [&](Section& item) {
+    item.number("amount", &sensor->sharpening, {0, 5});
+    item.number("radius_px", &sensor->sharpening_radius, {0.3, 20});
+  });
   section.integer("jpeg_quality", &sensor->jpeg_quality, {1, 100});
   section.list("brightness_steps", [&](Section& item) {
     SensorConfig::Step step;
@@ -146,6 +237,20 @@ void read_sensor(Section& section, SensorConfig* sensor) {
   });
 }
 
+void read_gear(Section& section, double quantum, TelemetryConfig* telemetry) {
+  for (const auto& [axis, gear] :
+       {std::pair{"pan", &telemetry->pan_gear}, {"tilt", &telemetry->tilt_gear}}) {
+    section.list(axis, [&, harmonics = gear](Section& item) {
+      GearHarmonic harmonic;
+      item.number("amplitude_mrad", &harmonic.amplitude, {0, 100}, kMilli);
+      item.number("period_deg", &harmonic.period, {0.01, 360}, kDegree);
+      item.number("phase_deg", &harmonic.phase, kAny, kDegree);
+      if (harmonic.period <= quantum) item.fail("period_deg must be more than quantum_deg");
+      harmonics->push_back(harmonic);
+    });
+  }
+}
+
 void read_telemetry(Section& section, TelemetryConfig* telemetry) {
   section.number("rate_hz", &telemetry->rate_hz, kPositive);
   section.number("sigma_rad", &telemetry->sigma, kNotNegative);
@@ -153,6 +258,14 @@ void read_telemetry(Section& section, TelemetryConfig* telemetry) {
   section.number("internal_rate_hz", &telemetry->internal_rate_hz, kNotNegative);
   section.number("stale_repeat_probability", &telemetry->stale_repeat_probability, kUnitInterval);
   section.number("latency_ms", &telemetry->latency, kNotNegative, kMilli);
+  section.section("gear", [&](Section& item) { read_gear(item, telemetry->quantum, telemetry); });
+  section.section("play", [&](Section& item) {
+    using Encoder = PlayConfig::Encoder;
+    item.number("pan_mrad", &telemetry->play.pan, {0, 100}, kMilli);
+    item.number("tilt_mrad", &telemetry->play.tilt, {0, 100}, kMilli);
+    item.choice<Encoder>("encoder", &telemetry->play.encoder,
+                         {{"motor", Encoder::kMotor}, {"output", Encoder::kOutput}});
+  });
 }
 
 void read_jitter(Section& section, JitterConfig* jitter) {
@@ -173,6 +286,17 @@ void read_timing(Section& section, TimingConfig* timing) {
                  kMicro);
 }
 
+void read_encoding(Section& section, EncodingConfig* encoding) {
+  section.choice<VideoCodec>(
+      "codec", &encoding->codec,
+      {{"mjpeg", VideoCodec::kMjpeg}, {"h264", VideoCodec::kH264}, {"h265", VideoCodec::kH265}});
+  section.integer("kbit_s", &encoding->kbit_s, {10, 1e6});
+  section.integer("gop", &encoding->gop, {1, 1e5});
+  if (encoding->codec == VideoCodec::kMjpeg && (encoding->kbit_s > 0 || encoding->gop > 0)) {
+    section.fail("kbit_s and gop need codec: h264 or h265");
+  }
+}
+
 void read_recording(Section& section, RecordingConfig* recording) {
   using Images = RecordingConfig::Images;
   section.choice<Images>("images", &recording->images,
@@ -180,16 +304,19 @@ void read_recording(Section& section, RecordingConfig* recording) {
                           {"png", Images::kPng},
                           {"pgm", Images::kPgm},
                           {"none", Images::kNone}});
+  read_encoding(section, &recording->encoding);
+  if (recording->images != Images::kVideo && recording->encoding.codec != VideoCodec::kMjpeg) {
+    section.fail("codec needs images: video");
+  }
   section.number("landmark_spacing", &recording->landmark_spacing, kPositive);
   section.number("pixel_sigma_px", &recording->pixel_sigma, kNotNegative);
+  read_distance(section, "landmark_distance_m", false, &recording->landmark_distance);
 }
 
 void read_live(Section& section, LiveConfig* live) {
-  using Codec = LiveConfig::Codec;
   section.integer("rtsp_port", &live->rtsp_port, kPort);
   section.integer("http_port", &live->http_port, kPort);
-  section.choice<Codec>("codec", &live->codec,
-                        {{"mjpeg", Codec::kMjpeg}, {"h264", Codec::kH264}, {"h265", Codec::kH265}});
+  read_encoding(section, &live->encoding);
   section.text("rtp_host", &live->rtp_host);
   section.integer("rtp_port", &live->rtp_port, kPort);
   section.path("sdp_file", &live->sdp_file);
@@ -200,7 +327,7 @@ void read_live(Section& section, LiveConfig* live) {
   };
   optional_port("mjpeg_port", &live->mjpeg_port);
   optional_port("onvif_port", &live->onvif_port);
-  if (live->mjpeg_port && live->codec != Codec::kMjpeg) {
+  if (live->mjpeg_port && live->encoding.codec != VideoCodec::kMjpeg) {
     section.fail("mjpeg_port needs codec: mjpeg");
   }
   using Link = LiveConfig::Link;
@@ -304,6 +431,10 @@ void read_config(Section& section, Config* config) {
   });
   section.path("truth_dir", &config->truth_dir);
   section.finish();
+  const Eigen::Vector2d centre = config->camera.centre.cwiseAbs();
+  if (centre.x() > config->image.width / 2.0 || centre.y() > config->image.height / 2.0) {
+    section.fail("camera: centre_px is beyond the image's border");
+  }
   if (std::abs(config->camera.line_delay) * config->image.height * config->image.rate_hz > 1) {
     section.fail("camera: reading out all rows (line_delay_us x height) outlasts a frame");
   }

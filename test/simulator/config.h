@@ -30,6 +30,23 @@ struct ImageConfig {
   double rate_hz = 25;  // on the host clock
 };
 
+// f drifts by a factor: 1 + part * t / period until then, or 1 + part / 2 * sin(2 pi t / period).
+struct Breathing {
+  enum class Type { kLinear, kSine };
+  Type type = Type::kLinear;
+  double part = 0;
+  double period = 12;  // s
+};
+
+// One swing of the mast: the base turns against the world about an axis of its own by amplitude sin(2 pi frequency t + phase).
+struct Swing {
+  enum class Axis { kForward, kRight, kDown };
+  Axis axis = Axis::kRight;
+  double amplitude = 0;  // rad
+  double frequency = 1;  // Hz
+  double phase = 0;      // rad
+};
+
 struct CameraConfig {
   double focal_length = 1500;                                 // px
   double aspect = 1;                                          // f_v / f_u
@@ -40,6 +57,12 @@ struct CameraConfig {
   double pan_scale = 1;                                       // measured / true
   double tilt_scale = 1;                                      // measured / true
   double clock_offset = 0;                                    // s, telemetry clock - image clock
+  double radial_distortion_2 = 0;                             // k2, of r^4
+  Eigen::Vector2d tangential{Eigen::Vector2d::Zero()};        // p1, p2
+  Eigen::Vector2d centre{Eigen::Vector2d::Zero()};            // px, off the image's
+  Breathing breathing;
+  Eigen::Vector3d pupil{Eigen::Vector3d::Zero()};  // m, right, down, forward of where the axes meet
+  std::vector<Swing> sway;
 };
 
 struct PathConfig {
@@ -52,6 +75,20 @@ struct PathConfig {
   double focal_length =
       0;  // px, whose fields of view are meant; 0: the camera's, with a zoom the longest of its path
   std::filesystem::path file;
+};
+
+// What leaves in the wind do to a patch: its places are shifted by a field that changes.
+struct FlutterConfig {
+  double rms_px = 1;    // along each axis, at the longest focal length
+  double size_px = 30;  // what moves as one
+  double rate_hz = 1;   // of changes
+};
+
+// From where the axes meet (depth_map.h).
+struct DistanceConfig {
+  double nearest = 0, farthest = 0;  // m
+  int layers = 0;                    // 0: smooth
+  double length = 0.1;               // rad, over which it changes
 };
 
 // A rectangle on the sphere around a direction: a photo, generated texture, or one brightness.
@@ -67,12 +104,35 @@ struct PatchConfig {
   double azimuth_rate = 0, elevation_rate = 0;  // rad/s, moving objects only
   double brightness = 0.5;                      // flat areas and moving objects, 1 = white
   Projection projection = Projection::kTangent;
+  std::optional<DistanceConfig> distance;  // nothing: infinitely far
+  std::optional<FlutterConfig> flutter;
+};
+
+// A deck that drifts (clouds.h), in front of all else.
+struct CloudsConfig {
+  double fraction = 0.6;
+  double rate = 0;     // rad/s; or
+  double rate_px = 0;  // px/s at the longest focal length
+  double heading = 0;  // rad, 0 right, a quarter turn up
+  double size_px = 100;
+  double brightness = 0.75, contrast = 0.12;
+  double above = -1.5707963267948966;  // rad, elevation
+};
+
+// Waves below an elevation (clouds.h), behind the clouds and in front of the patches.
+struct WaterConfig {
+  double below = 0;     // rad
+  double rate_px = 20;  // px/s at the longest focal length
+  double size_px = 40;  // of the longest wave
+  double brightness = 0.4, contrast = 0.1;
 };
 
 struct SceneConfig {
   double background = 0.5;  // where no patch lies, 1 = white
   double detail = 1;        // generated contrast at the scales a photo lacks, 1 = natural
   std::vector<PatchConfig> photos, procedural, flat, moving;
+  std::optional<CloudsConfig> clouds;
+  std::optional<WaterConfig> water;
 };
 
 struct SensorConfig {
@@ -88,9 +148,29 @@ struct SensorConfig {
   double read_noise = 0;  // grey levels
   double vignetting = 0;  // light lost in the corners, 0 to 1
   double boil = 0;        // px, standard deviation along each axis
+  // Over so much its correlation falls to exp(-1/2); 0: the renderer's own choice.
+  double boil_length = 0;        // px
+  double boil_time = 0;          // s
+  double noise_reduction = 0;    // part of the picture before (picture_filter.h)
+  double sharpening = 0;         // of what an unsharp mask takes away
+  double sharpening_radius = 1;  // px, its standard deviation
   int jpeg_quality = 90;
   std::vector<Step> brightness_steps;
   std::vector<Interval> covered;
+};
+
+// One part of a gear's error: what is reported is off by amplitude * sin(2 pi angle / period + phase).
+struct GearHarmonic {
+  double amplitude = 0;           // rad
+  double period = 6.28318530718;  // rad, of the true angle
+  double phase = 0;               // rad
+};
+
+// Backlash (played_path.h).
+struct PlayConfig {
+  enum class Encoder { kMotor, kOutput };
+  double pan = 0, tilt = 0;  // rad
+  Encoder encoder = Encoder::kMotor;
 };
 
 struct TelemetryConfig {
@@ -100,6 +180,8 @@ struct TelemetryConfig {
   double internal_rate_hz = 0;          // > 0: the device refreshes its value only so often
   double stale_repeat_probability = 0;  // a sample repeats its predecessor
   double latency = 0;                   // s, live only: age of the angle the device reports
+  std::vector<GearHarmonic> pan_gear, tilt_gear;
+  PlayConfig play;
 };
 
 struct JitterConfig {
@@ -117,17 +199,27 @@ struct TimingConfig {
   double telemetry_period_sigma = 0;  // s, likewise
 };
 
+enum class VideoCodec { kMjpeg, kH264, kH265 };
+
+// Of what is sent or kept.
+struct EncodingConfig {
+  VideoCodec codec = VideoCodec::kMjpeg;
+  int kbit_s = 0;  // of H.264 and H.265; 0: as good as a quality takes
+  int gop = 0;     // pictures from one that stands by itself to the next; 0: a second of them
+};
+
 struct RecordingConfig {
   enum class Images { kVideo, kPng, kPgm, kNone };
-  Images images = Images::kVideo;  // kNone: tracks.csv stands in place of images
-  double landmark_spacing = 0.1;   // of tracks.csv, in horizontal fields of view
-  double pixel_sigma = 0.3;        // px, of tracks.csv
+  Images images = Images::kVideo;                   // kNone: tracks.csv stands in place of images
+  EncodingConfig encoding;                          // of kVideo
+  double landmark_spacing = 0.1;                    // of tracks.csv, in horizontal fields of view
+  double pixel_sigma = 0.3;                         // px, of tracks.csv
+  std::optional<DistanceConfig> landmark_distance;  // of tracks.csv, drawn by ratio
 };
 
 struct LiveConfig {
-  enum class Codec { kMjpeg, kH264, kH265 };
   int rtsp_port = 0, http_port = 0;  // 0: any free one
-  Codec codec = Codec::kMjpeg;
+  EncodingConfig encoding;
   std::string rtp_host;  // if set, plain RTP is sent there besides RTSP
   int rtp_port = 0;
   std::filesystem::path sdp_file;  // of the plain RTP stream

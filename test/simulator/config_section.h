@@ -8,6 +8,7 @@
 #include <functional>
 #include <limits>
 #include <set>
+#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -44,6 +45,10 @@ class Section {
 
   [[nodiscard]] bool has(const char* key) const { return node_[key].IsDefined(); }
 
+  [[nodiscard]] bool is_section(const char* key) const {
+    return node_[key].IsDefined() && node_[key].IsMap();
+  }
+
   // The number in the file times `unit` becomes the value; the range is that of the file.
   void number(const char* key, double* value, Range range = kAny, double unit = 1) {
     if (const YAML::Node node = take(key)) *value = scalar(node, key, range) * unit;
@@ -71,6 +76,15 @@ class Section {
         fail(node, std::string(key) + " must be two numbers: [a, b]");
       }
       *value = Eigen::Vector2d(scalar(node[0], key, kAny), scalar(node[1], key, kAny)) * unit;
+    }
+  }
+
+  void triple(const char* key, Eigen::Vector3d* value, Range range, double unit) {
+    if (const YAML::Node node = take(key)) {
+      if (!node.IsSequence() || node.size() != 3) {
+        fail(node, std::string(key) + " must be three numbers: [a, b, c]");
+      }
+      for (int i = 0; i < 3; ++i) (*value)[i] = scalar(node[i], key, range) * unit;
     }
   }
 
@@ -142,8 +156,9 @@ class Section {
       std::string bounds = range.lowest == kPositive.lowest ? "more than 0" : "";
       if (bounds.empty() && range.highest == kInfinity) bounds = "0 or more";
       if (bounds.empty()) {
-        bounds = "between " + YAML::Node(range.lowest).Scalar() + " and " +
-                 YAML::Node(range.highest).Scalar();
+        std::ostringstream text;  // not every digit of a binary fraction
+        text << "between " << range.lowest << " and " << range.highest;
+        bounds = text.str();
       }
       fail(node, std::string(key) + " is " + node.Scalar() + ", must be " + bounds);
     }

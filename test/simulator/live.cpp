@@ -16,6 +16,7 @@
 
 #include "test/simulator/parallel.h"
 #include "test/simulator/pattern_renderer.h"
+#include "test/simulator/picture_filter.h"
 #include "test/simulator/renderer.h"
 #include "test/simulator/servers/encoder.h"
 #include "test/simulator/servers/head_server.h"
@@ -84,8 +85,7 @@ class Subject {
       poses_.emplace(folder / "truth.csv");
     } else {
       write_truth_yaml(folder / "truth.yaml", config, scene_->camera());
-      const Zoom* zoom = scene_->camera().zoom();
-      angles_.emplace(folder / "truth.csv", zoom != nullptr ? std::optional(*zoom) : std::nullopt);
+      angles_.emplace(folder / "truth.csv", scene_->camera());
     }
   }
   // Nothing without write_truth().
@@ -130,29 +130,46 @@ std::vector<std::vector<std::uint8_t>> encoded_frames(const Config& config, cons
                                                       const std::atomic<bool>& stop) {
   const int width = config.image.width;
   const int height = config.image.height;
-  const bool jpeg = config.live.codec == LiveConfig::Codec::kMjpeg;
-  const auto standard = config.live.codec == LiveConfig::Codec::kH265
-                            ? VideoEncoder::Standard::kH265
-                            : VideoEncoder::Standard::kH264;
+  const EncodingConfig& encoding = config.live.encoding;
+  const bool jpeg = encoding.codec == VideoCodec::kMjpeg;
+  const auto standard = encoding.codec == VideoCodec::kH265 ? VideoEncoder::Standard::kH265
+                                                            : VideoEncoder::Standard::kH264;
   VideoEncoder encoder;
   std::string error;
-  if (!jpeg && !encoder.open(standard, width, height, config.image.rate_hz, &error)) {
+  if (!jpeg && !encoder.open(standard, width, height, config.image.rate_hz,
+                             {encoding.kbit_s, encoding.gop}, &error)) {
     throw std::runtime_error(error);
   }
   std::vector<std::vector<std::uint8_t>> frames(count);
+  const auto render = [&](std::size_t i) {
+    return subject.render(static_cast<double>(i) / config.image.rate_hz,
+                          static_cast<std::int64_t>(i));
+  };
+  const auto keep_jpeg = [&](std::size_t i) {
+    if (!jpeg) return;
+    frames[i] = encode_jpeg(frames[i].data(), width, height, width, config.sensor.jpeg_quality);
+  };
+  PictureFilter filter(config.sensor, config.image);
+  // What goes round comes after its own end.
+  if (subject.period(config.image.rate_hz) == static_cast<std::int64_t>(count)) {
+    for (std::size_t i = count - std::min(count, filter.memory()); i < count && !stop; ++i) {
+      std::vector<std::uint8_t> before = render(i);
+      filter.apply(&before);
+    }
+  }
   Progress progress("rendering frame", count);
   const std::size_t batch = 4 * processors();
   for (std::size_t start = 0; start < count && !stop; start += batch) {
     const std::size_t size = std::min(batch, count - start);
     parallel_for(size, [&](std::size_t i) {
-      auto& frame = frames[start + i];
-      frame = subject.render(static_cast<double>(start + i) / config.image.rate_hz,
-                             static_cast<std::int64_t>(start + i));
-      if (jpeg) {
-        frame = encode_jpeg(frame.data(), width, height, width, config.sensor.jpeg_quality);
-      }
+      frames[start + i] = render(start + i);
+      if (!filter.changes()) keep_jpeg(start + i);
     });
     for (std::size_t i = start; i < start + size; ++i) {
+      if (filter.changes()) {
+        filter.apply(&frames[i]);
+        keep_jpeg(i);
+      }
       // The first frame begins the loop anew each time round, so nothing may precede it.
       if (!jpeg) frames[i] = encoder.encode(frames[i].data(), width, i == 0);
       if (frames[i].empty()) throw std::runtime_error("a frame could not be encoded");
@@ -165,10 +182,10 @@ std::vector<std::vector<std::uint8_t>> encoded_frames(const Config& config, cons
 VideoServerOptions video_options(const Config& config) {
   VideoServerOptions options;
   options.port = config.live.rtsp_port;
-  options.codec = config.live.codec == LiveConfig::Codec::kH264 ? VideoServerOptions::Codec::kH264
-                  : config.live.codec == LiveConfig::Codec::kH265
-                      ? VideoServerOptions::Codec::kH265
-                      : VideoServerOptions::Codec::kMjpeg;
+  const VideoCodec codec = config.live.encoding.codec;
+  options.codec = codec == VideoCodec::kH264   ? VideoServerOptions::Codec::kH264
+                  : codec == VideoCodec::kH265 ? VideoServerOptions::Codec::kH265
+                                               : VideoServerOptions::Codec::kMjpeg;
   options.width = config.image.width;
   options.height = config.image.height;
   options.rate_hz = config.image.rate_hz;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "test/simulator/path_table.h"
+#include "test/simulator/played_path.h"
 #include "test/simulator/random.h"
 
 namespace alidade::simulator {
@@ -132,6 +133,7 @@ class Sampled : public Path {
     return {value(&Angles::pan), value(&Angles::tilt)};
   }
   double period_s() const override { return 0; }
+  Span moving() const override { return {times_.front(), times_.back()}; }
 
  private:
   double tangent(std::size_t i, double Angles::*axis) const {
@@ -143,9 +145,7 @@ class Sampled : public Path {
   std::vector<Angles> points_;
 };
 
-}  // namespace
-
-std::unique_ptr<Path> make_path(const Config& config) {
+std::unique_ptr<Path> make_exact_path(const Config& config) {
   const double field = horizontal_field_of_view(config);
   switch (config.path.type) {
     case PathConfig::Type::kTripleCosine:
@@ -158,6 +158,15 @@ std::unique_ptr<Path> make_path(const Config& config) {
       return std::make_unique<Sampled>(config.path.file);
   }
   throw std::logic_error("unknown path type");
+}
+
+}  // namespace
+
+std::unique_ptr<Path> make_path(const Config& config) {
+  std::unique_ptr<Path> path = make_exact_path(config);
+  const PlayConfig& play = config.telemetry.play;
+  if (play.pan == 0 && play.tilt == 0) return path;
+  return std::make_unique<PlayedPath>(std::move(path), play);
 }
 
 }  // namespace alidade::simulator

@@ -30,11 +30,18 @@ class Path {
  public:
   virtual ~Path() = default;
   [[nodiscard]] virtual Angles at(double time_s) const = 0;
+  // What the head's encoders see then: the same, but for play (played_path.h).
+  [[nodiscard]] virtual Angles encoder_at(double time_s) const { return at(time_s); }
   // After how many seconds the path repeats; 0 if it does not.
   [[nodiscard]] virtual double period_s() const = 0;
+  // Of a path that does not repeat: before and after it rests.
+  struct Span {
+    double from = 0, to = 0;  // s
+  };
+  [[nodiscard]] virtual Span moving() const { return {}; }
 };
 
-// Throws ConfigError if a CSV file cannot be read; the text names file and line.
+// The camera's, after the play that telemetry states. Throws ConfigError if a CSV file cannot be read; the text names file and line.
 [[nodiscard]] std::unique_ptr<Path> make_path(const Config& config);
 
 }  // namespace alidade::simulator

@@ -22,7 +22,11 @@ enum class Stream : std::uint64_t {
   kTexture,
   kTracks,
   kPeriods,
-  kZoom
+  kZoom,
+  kDepth,
+  kClouds,
+  kWater,
+  kFlutter
 };
 
 // The finaliser of splitmix64 (Steele, Lea, Flood 2014): every input bit changes half the output.

@@ -12,6 +12,7 @@
 
 #include "test/simulator/parallel.h"
 #include "test/simulator/pattern_renderer.h"
+#include "test/simulator/picture_filter.h"
 #include "test/simulator/random.h"
 #include "test/simulator/renderer.h"
 #include "test/simulator/servers/encoder.h"
@@ -61,8 +62,7 @@ void write_recording_yaml(const Config& config, const fs::path& directory) {
 void write_frames(const std::vector<FrameEvent>& frames, const Path& path,
                   const CameraModel& camera, const fs::path& directory) {
   OutputFile stamps(directory / "frames.csv");
-  TruthCsv truth(directory / "truth.csv",
-                 camera.zoom() != nullptr ? std::optional(*camera.zoom()) : std::nullopt);
+  TruthCsv truth(directory / "truth.csv", camera);
   stamps.stream() << "frame,receive_time_s,sender_time_s,sequence\n";
   for (const FrameEvent& event : frames) {
     stamps.stream() << event.frame << ',' << event.stamp_s << ',' << event.sender_s << ','
@@ -137,18 +137,44 @@ void write_guess_yaml(const Config& config, const CameraModel& camera, const fs:
   output.flush();
 }
 
-std::vector<std::uint8_t> encode(const Config& config, std::vector<std::uint8_t> image) {
-  const int width = config.image.width;
-  const int height = config.image.height;
-  if (config.recording.images == Images::kVideo) {
-    return encode_jpeg(image.data(), width, height, width, config.sensor.jpeg_quality);
+// One picture after the other, as it is kept.
+class PictureEncoder {
+ public:
+  explicit PictureEncoder(const Config& config) : config_(config) {
+    const EncodingConfig& encoding = config.recording.encoding;
+    if (!has_memory()) return;
+    const auto standard = encoding.codec == VideoCodec::kH265 ? VideoEncoder::Standard::kH265
+                                                              : VideoEncoder::Standard::kH264;
+    std::string error;
+    if (!encoder_.open(standard, config.image.width, config.image.height, config.image.rate_hz,
+                       {encoding.kbit_s, encoding.gop}, &error)) {
+      throw std::runtime_error(error);
+    }
   }
-  const cv::Mat picture(height, width, CV_8U, image.data());
-  std::vector<std::uint8_t> bytes;
-  cv::imencode(config.recording.images == Images::kPng ? ".png" : ".pgm", picture, bytes,
-               {cv::IMWRITE_PNG_COMPRESSION, 1});
-  return bytes;
-}
+
+  // Whether a picture takes those before it; else encode() may be called from any thread.
+  [[nodiscard]] bool has_memory() const {
+    return config_.recording.encoding.codec != VideoCodec::kMjpeg;
+  }
+
+  [[nodiscard]] std::vector<std::uint8_t> encode(std::vector<std::uint8_t> image) {
+    const int width = config_.image.width;
+    const int height = config_.image.height;
+    if (has_memory()) return encoder_.encode(image.data(), width, false);
+    if (config_.recording.images == Images::kVideo) {
+      return encode_jpeg(image.data(), width, height, width, config_.sensor.jpeg_quality);
+    }
+    const cv::Mat picture(height, width, CV_8U, image.data());
+    std::vector<std::uint8_t> bytes;
+    cv::imencode(config_.recording.images == Images::kPng ? ".png" : ".pgm", picture, bytes,
+                 {cv::IMWRITE_PNG_COMPRESSION, 1});
+    return bytes;
+  }
+
+ private:
+  const Config& config_;
+  VideoEncoder encoder_;
+};
 
 // Before a pattern a head says nothing, and a sender's exact clock would hide the stamps' jitter.
 void write_pattern_frames(const std::vector<FrameEvent>& frames, const PatternCamera& camera,
@@ -173,19 +199,28 @@ void write_images(const Config& config, const std::vector<FrameEvent>& frames, c
   const char* extension = config.recording.images == Images::kPng ? "png" : "pgm";
   std::optional<VideoWriter> writer;
   if (video) {
-    writer.emplace(directory / "video.mkv", config.image.width, config.image.height,
-                   config.image.rate_hz);
+    writer.emplace(directory / "video.mkv", config.recording.encoding.codec, config.image.width,
+                   config.image.height, config.image.rate_hz);
   } else {
     fs::create_directory(directory / "frames");
   }
+  PictureEncoder encoder(config);
+  PictureFilter filter(config.sensor, config.image);
+  const bool in_order = filter.changes() || encoder.has_memory();
   Progress progress("rendering frame", frames.size());
   // Rendered side by side in batches, written in order.
   const std::size_t batch = 4 * processors();
   for (std::size_t start = 0; start < frames.size(); start += batch) {
     std::vector<std::vector<std::uint8_t>> encoded(std::min(batch, frames.size() - start));
-    parallel_for(encoded.size(),
-                 [&](std::size_t i) { encoded[i] = encode(config, render(frames[start + i])); });
+    parallel_for(encoded.size(), [&](std::size_t i) {
+      encoded[i] = render(frames[start + i]);
+      if (!in_order) encoded[i] = encoder.encode(std::move(encoded[i]));
+    });
     for (std::size_t i = 0; i < encoded.size(); ++i) {
+      if (in_order) {
+        filter.apply(&encoded[i]);
+        encoded[i] = encoder.encode(std::move(encoded[i]));
+      }
       if (encoded[i].empty()) throw std::runtime_error("a frame could not be encoded");
       if (video) {
         const FrameEvent& event = frames[start + i];

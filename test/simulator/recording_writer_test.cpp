@@ -170,6 +170,42 @@ TEST_F(VirtualRecording, ProjectsLandmarksOfAGridIntoTracks) {
   for (const auto& [frame, count] : per_frame) EXPECT_NEAR(count, 75, 25) << frame;
 }
 
+TEST_F(VirtualRecording, LandmarksAtADistanceAreSeenFromThePupil) {
+  config_.recording.pixel_sigma = 0;
+  config_.recording.landmark_distance = DistanceConfig{20, 500, 0, 0.1};
+  config_.camera.pupil = {0.02, 0.03, 0.08};
+  const std::string recording = write();
+  const Table tracks = read_csv(recording + "tracks.csv", "frame,landmark,u_px,v_px,sigma_px");
+  const Table landmarks =
+      read_csv(recording + "truth_landmarks.csv", "landmark,inverse_distance_per_m");
+  std::map<double, double> inverse;
+  for (const auto& row : landmarks) {
+    inverse[row.at("landmark")] = row.at("inverse_distance_per_m");
+    EXPECT_GE(inverse[row.at("landmark")], 1 / 500.0 - 1e-12);
+    EXPECT_LE(inverse[row.at("landmark")], 1 / 20.0 + 1e-12);
+  }
+  const auto path = make_path(config_);
+  const CameraModel camera(config_.camera, config_.image, *path);
+  // All rays of a landmark meet in one place at its distance.
+  std::map<double, Eigen::Vector3d> places;
+  for (const auto& row : tracks) {
+    const double v = row.at("v_px");
+    const double time = row.at("frame") / 25 + v * config_.camera.line_delay;
+    const Eigen::Matrix3d turn = camera.base_from_camera_at(time);
+    const Eigen::Vector3d from = turn * config_.camera.pupil;
+    const Eigen::Vector3d ray = (turn * camera.slope(row.at("u_px"), v).homogeneous()).normalized();
+    const double distance = 1 / inverse.at(row.at("landmark"));
+    const double along = from.dot(ray);
+    const double length =
+        std::sqrt(distance * distance - from.squaredNorm() + along * along) - along;
+    const Eigen::Vector3d place = from + length * ray;
+    EXPECT_LT((places.emplace(row.at("landmark"), place).first->second - place).norm(),
+              1e-6 * distance);
+  }
+  EXPECT_EQ(places.size(), landmarks.size());
+  EXPECT_EQ(YAML::LoadFile(recording + "truth.yaml")["departures"]["pupil"][2].as<double>(), 0.08);
+}
+
 TEST_F(VirtualRecording, TellsTheZoomInTelemetryAndItsLensInTheTruth) {
   ZoomConfig& zoom = config_.zoom.emplace();
   zoom.centre = {5, -2};
@@ -211,6 +247,30 @@ TEST_F(VirtualRecording, TellsTheZoomInTelemetryAndItsLensInTheTruth) {
     EXPECT_NEAR(curve[i]["centre_offset"][0].as<double>(), lens.centre.x() - 80, 1e-6);
   }
   EXPECT_NEAR(curve[curve.size() - 1]["focal_length"].as<double>(), 24000, 1e-6);
+}
+
+TEST_F(VirtualRecording, TellsWhatACameraIsBeyondACalibrationsNames) {
+  config_.camera.radial_distortion_2 = 3;
+  config_.camera.tangential = {1e-3, -2e-3};
+  config_.camera.centre = {10, -8};
+  config_.camera.breathing = {Breathing::Type::kLinear, 1e-3, 2};
+  config_.telemetry.pan_gear = {{2e-4, 0.1, 0.5}};
+  config_.telemetry.play = {1e-4, 0, PlayConfig::Encoder::kOutput};
+  const std::string recording = write();
+  const YAML::Node yaml = YAML::LoadFile(recording + "truth.yaml");
+  EXPECT_EQ(yaml["centre_offset"]["value"][0].as<double>(), 10);
+  const YAML::Node departures = yaml["departures"];
+  EXPECT_EQ(departures["radial_distortion_2"].as<double>(), 3);
+  EXPECT_EQ(departures["tangential_distortion"][1].as<double>(), -2e-3);
+  EXPECT_EQ(departures["breathing"]["part"].as<double>(), 1e-3);
+  EXPECT_EQ(departures["gear"]["pan"][0]["period"].as<double>(), 0.1);
+  EXPECT_EQ(departures["gear"]["tilt"].size(), 0U);
+  EXPECT_EQ(departures["play"]["encoder"].as<std::string>(), "output");
+  const Table truth = read_csv(recording + "truth.csv",
+                               "frame,time_s,pan_rad,tilt_rad,sequence,sender_time_s,stamp_time_s,"
+                               "focal_length_px,radial_distortion,centre_u_px,centre_v_px");
+  EXPECT_NEAR(truth[25].at("focal_length_px"), 4321 * (1 + 0.5e-3), 1e-6);
+  EXPECT_EQ(truth[25].at("centre_u_px"), 90);
 }
 
 TEST_F(VirtualRecording, LandmarksOfATrackAreThereAtEveryZoomUnderTheSameNumber) {
@@ -282,6 +342,42 @@ TEST_F(VirtualRecording, WritesVideoThatLibavReads) {
   EXPECT_EQ(frames, 10);
   av_packet_free(&packet);
   avformat_close_input(&video);
+}
+
+TEST_F(VirtualRecording, KeepsVideoAtTheRateAskedFor) {
+  config_.image = {320, 240, 25};
+  config_.camera.focal_length = 1000;
+  config_.path.period = 20;
+  config_.duration = 5;
+  config_.sensor.read_noise = 6;
+  PatchConfig patch;
+  patch.width = patch.height = 1;
+  config_.scene.procedural = {patch};
+  config_.recording.images = RecordingConfig::Images::kVideo;
+  for (const auto codec : {VideoCodec::kH264, VideoCodec::kH265}) {
+    config_.recording.encoding = {codec, 800, 50};
+    const std::string folder = root_.path() + (codec == VideoCodec::kH264 ? "/h264" : "/h265");
+    write_recording(config_, folder);
+    const auto bytes = static_cast<double>(std::filesystem::file_size(folder + "/video.mkv"));
+    EXPECT_NEAR(bytes * 8 / 5 / 1000, 800, 160);
+    AVFormatContext* video = nullptr;
+    ASSERT_EQ(avformat_open_input(&video, (folder + "/video.mkv").c_str(), nullptr, nullptr), 0);
+    EXPECT_EQ(video->streams[0]->codecpar->codec_id,
+              codec == VideoCodec::kH264 ? AV_CODEC_ID_H264 : AV_CODEC_ID_HEVC);
+    EXPECT_GT(video->streams[0]->codecpar->extradata_size, 0);
+    AVPacket* packet = av_packet_alloc();
+    int frames = 0;
+    for (; av_read_frame(video, packet) >= 0; ++frames) {
+      EXPECT_EQ((packet->flags & AV_PKT_FLAG_KEY) != 0, frames % 50 == 0) << frames;
+      // In the order of capture: no B pictures.
+      EXPECT_NEAR(static_cast<double>(packet->pts) * av_q2d(video->streams[0]->time_base),
+                  frames / 25.0, 1e-3);
+      av_packet_unref(packet);
+    }
+    EXPECT_EQ(frames, 125);
+    av_packet_free(&packet);
+    avformat_close_input(&video);
+  }
 }
 
 TEST_F(VirtualRecording, WritesNumberedPictures) {

@@ -13,8 +13,10 @@ namespace {
 
 constexpr int kMostExposures = 64;
 constexpr int kWaves = 24;
+constexpr int kSpectrumWaves = 96;  // where correlation is to be as asked for
 // Boil is evaluated at every so many columns, and is linear in between.
 constexpr int kBoilStep = 16;
+constexpr int kBoilStepsPerLength = 4;
 constexpr double kCoveredLight = 0.02;  // what comes through a lens cover
 // Where in a pixel each sub-exposure looks, in the order of time. Opposite points come at opposite
 // times, so that the blur of a moving edge is symmetric; in the larger set, used when motion is to be
@@ -35,6 +37,16 @@ constexpr double kRestBlur = 1;  // px during the exposure
 // A zoom's preparation for one focal length serves from half of it on; a little less, as the lens is no tangent.
 constexpr double kServesFrom = 0.45;
 
+double largest_inverse_distance(const SceneConfig& scene) {
+  double largest = 0;
+  for (const auto* patches : {&scene.moving, &scene.flat, &scene.photos, &scene.procedural}) {
+    for (const PatchConfig& patch : *patches) {
+      if (patch.distance) largest = std::max(largest, 1 / patch.distance->nearest);
+    }
+  }
+  return largest;
+}
+
 // Directions that bound what the camera will see: a grid over the image, all along the path.
 std::vector<Sight> all_sights(const Config& config, const Path& path, const CameraModel& camera) {
   constexpr int kTimes = 600;
@@ -52,9 +64,10 @@ std::vector<Sight> all_sights(const Config& config, const Path& path, const Came
       sights.push_back({sights.back().focal_length / 2, {}});
     }
   }
+  const Eigen::Vector3d parallax = camera.pupil() * largest_inverse_distance(config.scene);
   for (int i = 0; i <= times; ++i) {
     const double time = length * i / times;
-    const Eigen::Matrix3d turn = camera.base_from_camera_at(time);
+    const Eigen::Matrix3d turn = camera.world_from_camera_at(time);
     const Lens lens = camera.lens_at(time);
     for (int row = 0; row <= kGrid; ++row) {
       for (int column = 0; column <= kGrid; ++column) {
@@ -62,10 +75,13 @@ std::vector<Sight> all_sights(const Config& config, const Path& path, const Came
         const double v = config.image.height * row / static_cast<double>(kGrid);
         const Eigen::Vector2d slope = camera.slope_at(u, v, time);
         if (slope.hasNaN()) continue;
-        const Eigen::Vector3d d_base = turn * slope.homogeneous().normalized();
+        const Eigen::Vector3d d_camera = slope.homogeneous().normalized();
         for (Sight& sight : sights) {
           const bool serves = lens.focal_length >= kServesFrom * sight.focal_length;
-          if (serves || &sight == &sights.back()) sight.seen.push_back(d_base);
+          if (!serves && &sight != &sights.back()) continue;
+          sight.seen.push_back(turn * d_camera);
+          if (!parallax.isZero(0))
+            sight.seen.push_back((turn * (d_camera + parallax)).normalized());
         }
       }
     }
@@ -81,27 +97,41 @@ Renderer::Renderer(const Config& config, const Path& path)
       scene_(config.scene, all_sights(config, path, camera_), camera_.zoom() != nullptr,
              config.seed),
       noise_(config.sensor, config.seed) {
+  const double length = config.sensor.boil_length;
+  const double time = config.sensor.boil_time;
+  boil_step_ = length > 0 ? std::clamp(static_cast<int>(length / kBoilStepsPerLength), 1, kBoilStep)
+                          : kBoilStep;
   if (config.sensor.boil > 0) {
     std::mt19937_64 generator = make_generator(config.seed, Stream::kBoil);
     std::normal_distribution<double> normal;
     std::uniform_real_distribution<double> turn(0, kTwoPi);
     std::uniform_real_distribution<double> pace(0.5, 1.5);
-    for (int i = 0; i < kWaves; ++i) {
+    const int waves = length > 0 || time > 0 ? kSpectrumWaves : kWaves;
+    const double per_px = length > 0 ? 1 / length : kTwoPi / (0.2 * config.image.width);
+    for (int i = 0; i < waves; ++i) {
       // A sum of n waves of amplitude a, in directions all round, has a variance of n a^2 / 4 along
       // each axis.
-      const double angle = kTwoPi * i / kWaves;
-      const double amplitude = config.sensor.boil * std::sqrt(4.0 / kWaves);
-      waves_.push_back({kTwoPi / (0.2 * config.image.width) * normal(generator),
-                        kTwoPi / (0.2 * config.image.width) * normal(generator),
-                        kTwoPi / 0.5 * pace(generator), turn(generator),
+      const double angle = kTwoPi * i / waves;
+      const double amplitude = config.sensor.boil * std::sqrt(4.0 / waves);
+      waves_.push_back({per_px * normal(generator), per_px * normal(generator),
+                        time > 0 ? normal(generator) / time : kTwoPi / 0.5 * pace(generator),
+                        turn(generator),
                         amplitude * Eigen::Vector2d(std::cos(angle), std::sin(angle))});
     }
   }
 }
 
 bool Renderer::steady() const {
-  return config_.sensor.boil == 0 && config_.scene.moving.empty() &&
-         config_.sensor.brightness_steps.empty() && config_.sensor.covered.empty();
+  const auto still = [](const PatchConfig& patch) { return !patch.flutter; };
+  const SceneConfig& scene = config_.scene;
+  if (scene.clouds || scene.water ||
+      !std::all_of(scene.photos.begin(), scene.photos.end(), still) ||
+      !std::all_of(scene.procedural.begin(), scene.procedural.end(), still)) {
+    return false;
+  }
+  return !camera_.breathes() && !camera_.sways() && config_.sensor.boil == 0 &&
+         config_.scene.moving.empty() && config_.sensor.brightness_steps.empty() &&
+         config_.sensor.covered.empty();
 }
 
 Eigen::Vector2d Renderer::boil(double u, double v, double time_s) const {
@@ -113,20 +143,20 @@ Eigen::Vector2d Renderer::boil(double u, double v, double time_s) const {
   return sum;
 }
 
-void Renderer::rays_of_row(const Lens* lens, double v, double offset_u, double time_s,
+void Renderer::rays_of_row(const Lens& lens, double v, double offset_u, double time_s,
                            std::vector<double>* x, std::vector<double>* y) const {
   Eigen::Vector2d left = Eigen::Vector2d::Zero();
   Eigen::Vector2d right = boil(0, v, time_s);
   for (int column = 0; column < config_.image.width; ++column) {
-    const int within = column % kBoilStep;
+    const int within = column % boil_step_;
     if (within == 0) {
       left = right;
-      right = boil(column + kBoilStep, v, time_s);
+      right = boil(column + boil_step_, v, time_s);
     }
-    const Eigen::Vector2d shift = left + (right - left) * (within / double{kBoilStep});
+    const Eigen::Vector2d shift =
+        left + (right - left) * (within / static_cast<double>(boil_step_));
     const double u = column + 0.5 + offset_u + shift.x();
-    const Eigen::Vector2d slope =
-        lens != nullptr ? lens->slope(u, v + shift.y()) : camera_.slope(u, v + shift.y());
+    const Eigen::Vector2d slope = camera_.slope_of(lens, u, v + shift.y());
     (*x)[static_cast<std::size_t>(column)] = slope.x();
     (*y)[static_cast<std::size_t>(column)] = slope.y();
   }
@@ -152,8 +182,8 @@ std::vector<std::uint8_t> Renderer::render(double t0_s, std::int64_t sequence) c
   const double readout = height * config_.camera.line_delay;
   const double opens = t0_s + readout / 2 - sensor.exposure / 2;
   const double closes = t0_s + readout / 2 + sensor.exposure / 2;
-  const Eigen::Matrix3d before = camera_.base_from_camera_at(opens);
-  const Eigen::Matrix3d after = camera_.base_from_camera_at(closes);
+  const Eigen::Matrix3d before = camera_.world_from_camera_at(opens);
+  const Eigen::Matrix3d after = camera_.world_from_camera_at(closes);
   const double focal_length = camera_.lens_at(closes).focal_length;
   // The norm of a difference of rotations by the small angle a is sqrt(2) a. Zooming is fastest in the corners.
   const double blur = focal_length * (after - before).norm() / std::sqrt(2.0) +
@@ -179,10 +209,10 @@ std::vector<std::uint8_t> Renderer::render(double t0_s, std::int64_t sequence) c
                                              ? kPointsAtRest.at(static_cast<std::size_t>(i))
                                              : kPointsInMotion.at(static_cast<std::size_t>(i % 8));
       const Lens lens = camera_.lens_at(time);
-      rays_of_row(camera_.zoom() != nullptr ? &lens : nullptr, v + offset_v, offset_u, time, &x,
-                  &y);
-      scene_.shade(camera_.base_from_camera_at(time), time, lens.focal_length, x.data(), y.data(),
-                   row_size, 1.0F / static_cast<float>(exposures), signal.data());
+      rays_of_row(lens, v + offset_v, offset_u, time, &x, &y);
+      scene_.shade(camera_.world_from_camera_at(time), camera_.pupil(), time, lens.focal_length,
+                   x.data(), y.data(), row_size, 1.0F / static_cast<float>(exposures),
+                   signal.data());
     }
 
     const double row_light = 255 * light(row_time);

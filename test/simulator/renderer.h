@@ -8,7 +8,8 @@
 // Then, in grey levels (255 = white): vignetting 1 - a (r / r_corner)^2, brightness step, lens cover,
 // noise of variance shot_noise * signal + read_noise^2, rounding and clipping to 8 bits.
 // Boil moves each pixel's ray by a random field, smooth in space (about a tenth of the image) and time
-// (about a quarter of a second), of zero mean and the standard deviation asked for.
+// (about a quarter of a second), of zero mean and the standard deviation asked for. With a length L or a time T of its own it is
+// correlated as exp(-distance^2 / 2 L^2) or exp(-t^2 / 2 T^2): a sum of waves whose numbers are drawn from that one's spectrum.
 // render() is thread-safe, and what it makes depends on its arguments only.
 
 #include <array>
@@ -42,8 +43,8 @@ class Renderer {
   };
 
   [[nodiscard]] Eigen::Vector2d boil(double u, double v, double time_s) const;
-  // lens: with a zoom, that of time_s; null: the camera's.
-  void rays_of_row(const Lens* lens, double v, double offset_u, double time_s,
+  // lens: that of time_s.
+  void rays_of_row(const Lens& lens, double v, double offset_u, double time_s,
                    std::vector<double>* x, std::vector<double>* y) const;
   [[nodiscard]] double light(double time_s) const;
 
@@ -51,6 +52,7 @@ class Renderer {
   CameraModel camera_;
   Scene scene_;
   std::vector<Wave> waves_;
+  int boil_step_;  // px, between columns where boil is evaluated
   SensorNoise noise_;
 };
 

@@ -261,6 +261,88 @@ TEST_F(VirtualSensor, MovesAnObjectAtItsRate) {
   EXPECT_NEAR(moved.y(), 40, 0.1);
 }
 
+// Where a camera whose pupil is off the axes' crossing sees a near place, by plain geometry.
+TEST_F(VirtualSensor, SeesANearPatchFromItsPupil) {
+  Config config = still_camera();
+  config.scene.background = 0;
+  config.camera.pupil = {0.05, 0.03, 0.1};
+  PatchConfig patch;
+  patch.width = patch.height = 20e-3;
+  patch.brightness = 1;
+  patch.azimuth = 0.31;
+  patch.elevation = 0.18;
+  config.path.pan = 0.29;
+  config.path.tilt = 0.2;
+  for (const double distance : {5.0, 20.0, 100.0, 1e6}) {
+    patch.distance = DistanceConfig{distance, distance, 0, 0.1};
+    config.scene.flat = {patch};
+    const Image image = render(config);
+    Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+    for (int row = 0; row < 120; ++row) {
+      for (int column = 0; column < 160; ++column) {
+        sum += pixel(image, column, row) * Eigen::Vector2d(column + 0.5, row + 0.5);
+      }
+    }
+    const Eigen::Vector2d centroid = sum / (mean(image) * 160 * 120);
+    const Eigen::Vector3d forward(std::cos(0.2) * std::cos(0.29), std::cos(0.2) * std::sin(0.29),
+                                  -std::sin(0.2));
+    const Eigen::Vector3d right(-std::sin(0.29), std::cos(0.29), 0);
+    const Eigen::Vector3d down = forward.cross(right);
+    const Eigen::Vector3d place =
+        distance * Eigen::Vector3d(std::cos(0.18) * std::cos(0.31), std::cos(0.18) * std::sin(0.31),
+                                   -std::sin(0.18));
+    const Eigen::Vector3d ray = place - (0.05 * right + 0.03 * down + 0.1 * forward);
+    EXPECT_NEAR(centroid.x(), 80 + 1000 * ray.dot(right) / ray.dot(forward), 0.05) << distance;
+    EXPECT_NEAR(centroid.y(), 60 + 1000 * ray.dot(down) / ray.dot(forward), 0.05) << distance;
+  }
+}
+
+TEST_F(VirtualSensor, HidesAFarPatchBehindANearOneWhateverTheirOrder) {
+  Config config = still_camera();
+  PatchConfig far;
+  far.width = far.height = 60e-3;
+  far.brightness = 0.25;
+  PatchConfig near = far;
+  near.width = 20e-3;
+  near.brightness = 1;
+  near.distance = DistanceConfig{10, 10, 0, 0.1};
+  config.scene.flat = {far, near};
+  EXPECT_EQ(pixel(render(config), 80, 60), 255);
+  EXPECT_EQ(pixel(render(config), 95, 60), 64);
+  config.camera.pupil = {0.1, 0, 0};  // 10 px to the left is what is seen of the near one
+  EXPECT_EQ(pixel(render(config), 62, 60), 255);
+  EXPECT_EQ(pixel(render(config), 85, 60), 64);
+}
+
+TEST(VirtualDepth, WhatIsSeenStandsWhereItsDistanceHasIt) {
+  const Eigen::Vector3d pupil(0.04, -0.03, 0.1);
+  const auto coordinates = [](const Eigen::Vector3d& v) {
+    return Eigen::Vector2d(v.x() / v.z(), v.y() / v.z());
+  };
+  for (const int layers : {0, 4}) {
+    const DepthMap depth({6, 120, layers, 0.1}, 7);
+    double nearest = 1e9;
+    double farthest = 0;
+    int exact = 0;
+    constexpr int kRays = 1000;
+    for (int i = 0; i < kRays; ++i) {
+      const Eigen::Vector3d ray(0.4 * std::sin(0.7 * i), 0.4 * std::sin(1.13 * i), 1);
+      const Eigen::Vector2d place = depth.seen(ray, pupil, coordinates);
+      const double distance = 1 / depth.inverse_distance(place);
+      nearest = std::min(nearest, distance);
+      farthest = std::max(farthest, distance);
+      const Eigen::Vector3d from_pupil = distance * place.homogeneous().normalized() - pupil;
+      const double off = from_pupil.normalized().cross(ray.normalized()).norm();
+      if (off < 1e-6) ++exact;
+      // What is hidden behind an edge is seen as part of the layer behind: then it is nearer by its place.
+      if (layers == 0) EXPECT_LT(off, 1e-5);
+    }
+    EXPECT_GT(exact, kRays * 9 / 10) << layers;
+    EXPECT_LT(nearest, 10);
+    EXPECT_GT(farthest, 60);
+  }
+}
+
 TEST_F(VirtualSensor, FindsAPlaceOfAnEquirectangularPhotoAllAround) {
   Config config = still_camera();
   PatchConfig globe;

@@ -10,6 +10,7 @@
 #include <optional>
 #include <string>
 
+#include "test/simulator/noise_field.h"
 #include "test/simulator/random.h"
 
 namespace alidade::simulator {
@@ -101,7 +102,18 @@ Eigen::Vector3d direction(double azimuth, double elevation) {
 
 Scene::Scene(const SceneConfig& config, const std::vector<Sight>& sights, bool zooms,
              std::uint64_t seed)
-    : background_(static_cast<float>(config.background)), zooms_(zooms) {
+    : background_(static_cast<float>(config.background)),
+      longest_focal_length_(sights.front().focal_length),
+      flutter_seed_(mix(seed, static_cast<std::uint64_t>(Stream::kFlutter))),
+      zooms_(zooms) {
+  if (config.clouds) {
+    clouds_.emplace(*config.clouds, longest_focal_length_,
+                    mix(seed, static_cast<std::uint64_t>(Stream::kClouds)));
+  }
+  if (config.water) {
+    water_.emplace(*config.water, longest_focal_length_,
+                   mix(seed, static_cast<std::uint64_t>(Stream::kWater)));
+  }
   for (const PatchConfig& moving : config.moving) {
     add_object(moving, object_picture(moving.brightness));
   }
@@ -128,6 +140,16 @@ Scene::Scene(const SceneConfig& config, const std::vector<Sight>& sights, bool z
     add_photo(procedural, make_procedural(kProceduralWidth, height, mix(texture_seed)), sights,
               config.detail, texture_seed);
   }
+  std::uint64_t depth_seed = mix(seed, static_cast<std::uint64_t>(Stream::kDepth));
+  for (Patch& patch : patches_) {
+    ++depth_seed;
+    if (patch.config.distance) patch.depth.emplace(*patch.config.distance, mix(depth_seed));
+  }
+  const auto distance = [](const Patch& patch) {
+    return patch.depth ? patch.depth->nearest() : std::numeric_limits<double>::infinity();
+  };
+  std::stable_sort(patches_.begin(), patches_.end(),
+                   [&](const Patch& a, const Patch& b) { return distance(a) < distance(b); });
   if (patches_.size() > kMostPatches) {
     throw ConfigError("scene: at most " + std::to_string(kMostPatches) + " patches can be seen");
   }
@@ -137,7 +159,7 @@ void Scene::add_object(const PatchConfig& config, const cv::Mat& picture) {
   const Eigen::Vector2d half_size(half_extent(config.projection, config.width),
                                   half_extent(config.projection, config.height));
   const Eigen::Vector2d texels(picture.cols, picture.rows);
-  Patch patch{config, half_size, {}};
+  Patch patch{config, half_size, {}, {}};
   patch.layers.push_back({Texture(picture), -half_size, texels.cwiseQuotient(2 * half_size),
                           Eigen::AlignedBox2d(-half_size, half_size)});
   patches_.push_back(std::move(patch));
@@ -153,7 +175,7 @@ void Scene::add_photo(const PatchConfig& config, const cv::Mat& photo,
     throw ConfigError(name + ": is more than 180 degrees high; make it narrower");
   }
   const double photo_density = photo.cols / (2 * half_size.x());
-  Patch patch{config, half_size, {}};
+  Patch patch{config, half_size, {}, {}};
   for (const Sight& sight : sights) {
     const auto part = seen_part(config, sight.seen, half_size);
     if (!part) continue;
@@ -203,9 +225,37 @@ float Scene::zoomed_sample(const Patch& patch, std::size_t layer, double level,
   return value + part * (coarse.texture.sample(other.x(), other.y(), 0) - value);
 }
 
-void Scene::shade(const Eigen::Matrix3d& base_from_camera, double time_s, double focal_length,
-                  const double* x, const double* y, std::size_t count, float weight,
-                  float* sum) const {
+void Scene::add_clouds_and_water(const Eigen::Matrix3d& base_from_camera, double time_s,
+                                 const double* x, const double* y, std::size_t size, float* shine,
+                                 float* open) const {
+  for (std::size_t i = 0; i < size; ++i) {
+    const Eigen::Vector3d ray = base_from_camera * Eigen::Vector3d(x[i], y[i], 1);
+    if (ray.hasNaN()) continue;
+    const double azimuth = std::atan2(ray.y(), ray.x());
+    const double elevation = -std::atan2(ray.z(), std::hypot(ray.x(), ray.y()));
+    const auto take = [&](const Cover& it) {
+      shine[i] += open[i] * it.part * it.brightness;
+      open[i] *= 1 - it.part;
+    };
+    if (clouds_) take(clouds_->at(azimuth, elevation, time_s));
+    if (water_ && open[i] > 0) take(water_->at(azimuth, elevation, time_s));
+  }
+}
+
+void Scene::flutter(const FlutterConfig& config, double time_s, std::uint64_t seed, double* right,
+                    double* down) const {
+  const double per_size = longest_focal_length_ / config.size_px;
+  const double scale = config.rms_px / longest_focal_length_ / kSpaceRms;
+  const double x = *right * per_size;
+  const double y = *down * per_size;
+  const double time = time_s * config.rate_hz;
+  *right += scale * smooth_noise(x, y, time, seed);
+  *down += scale * smooth_noise(x, y, time, seed + 1);
+}
+
+void Scene::shade(const Eigen::Matrix3d& base_from_camera, const Eigen::Vector3d& pupil,
+                  double time_s, double focal_length, const double* x, const double* y,
+                  std::size_t count, float weight, float* sum) const {
   std::array<Eigen::Matrix3d, kMostPatches> patch_from_camera;
   for (std::size_t n = 0; n < patches_.size(); ++n) {
     const PatchConfig& config = patches_[n].config;
@@ -220,6 +270,10 @@ void Scene::shade(const Eigen::Matrix3d& base_from_camera, double time_s, double
     const std::size_t size = std::min(kBlock, count - start);
     shine.fill(0);
     open.fill(1);
+    if (clouds_ || water_) {
+      add_clouds_and_water(base_from_camera, time_s, x + start, y + start, size, shine.data(),
+                           open.data());
+    }
     for (std::size_t n = 0; n < patches_.size(); ++n) {
       const Patch& patch = patches_[n];
       const Eigen::Matrix3d& turn = patch_from_camera[n];
@@ -227,13 +281,19 @@ void Scene::shade(const Eigen::Matrix3d& base_from_camera, double time_s, double
       std::array<double, kBlock> down{};
       std::array<float, kBlock> cover{};
       float most = 0;
+      const bool parallax = patch.depth && !pupil.isZero(0);
+      const Eigen::Vector3d from = turn * pupil;
+      const auto coordinates = [&](const Eigen::Vector3d& v) {
+        return patch_coordinates(patch.config.projection, v.x(), v.y(), v.z());
+      };
       for (std::size_t i = 0; i < size; ++i) {
         const double ray_x = x[start + i];
         const double ray_y = y[start + i];
-        const Eigen::Vector2d point = patch_coordinates(
-            patch.config.projection, turn(0, 0) * ray_x + turn(0, 1) * ray_y + turn(0, 2),
-            turn(1, 0) * ray_x + turn(1, 1) * ray_y + turn(1, 2),
-            turn(2, 0) * ray_x + turn(2, 1) * ray_y + turn(2, 2));
+        const Eigen::Vector3d ray(turn(0, 0) * ray_x + turn(0, 1) * ray_y + turn(0, 2),
+                                  turn(1, 0) * ray_x + turn(1, 1) * ray_y + turn(1, 2),
+                                  turn(2, 0) * ray_x + turn(2, 1) * ray_y + turn(2, 2));
+        const Eigen::Vector2d point =
+            parallax ? patch.depth->seen(ray, from, coordinates) : coordinates(ray);
         right[i] = point.x();
         down[i] = point.y();
         const double inside =
@@ -244,6 +304,12 @@ void Scene::shade(const Eigen::Matrix3d& base_from_camera, double time_s, double
         most = std::max(most, cover[i]);
       }
       if (most == 0) continue;
+      if (patch.config.flutter) {
+        for (std::size_t i = 0; i < size; ++i) {
+          if (cover[i] > 0)
+            flutter(*patch.config.flutter, time_s, mix(flutter_seed_, n), &right[i], &down[i]);
+        }
+      }
       std::size_t number = 0;
       if (patch.layers.size() > 1) {
         Eigen::AlignedBox2d box;

@@ -1,22 +1,26 @@
 #pragma once
 // The far scene around the virtual camera: patches on the sphere, the first in front.
 //
-// Order: moving objects, flat areas, photos, procedural patches, background. A patch is centred on a
+// Order: clouds, water, moving objects, flat areas, photos, procedural patches, background. A patch is centred on a
 // direction (azimuth positive right, elevation positive up; in base, FRD:
 // (cos e cos a, cos e sin a, -sin e)), upright there, and mapped either rectilinearly (tangent plane)
 // or by longitude and latitude about its own centre. Borders are soft over one pixel.
 // Each patch is prepared at the density the camera needs (about 1.4 texels a pixel at the optical
 // axis), over the part that will be seen; under a zoom once for each doubling of the focal length, over what is seen at about
 // that one or a longer one, and what lies between two densities is made of both. Brightness: 0 black, 1 white, linear.
-// shade() is thread-safe and does not allocate.
+// A patch with a distance is seen from the camera's pupil (depth_map.h), and the nearer patch is in front of the farther one,
+// whatever their order. shade() is thread-safe and does not allocate.
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
+#include "test/simulator/clouds.h"
 #include "test/simulator/config.h"
+#include "test/simulator/depth_map.h"
 #include "test/simulator/texture.h"
 
 namespace alidade::simulator {
@@ -40,8 +44,10 @@ class Scene {
 
   // Adds to sum[i] the brightness along each ray (x[i], y[i], 1) of the camera frame, times weight.
   // Neighbours in the arrays are neighbours in the image, a pixel apart. A NaN ray adds nothing. focal_length: of that moment, px.
-  void shade(const Eigen::Matrix3d& base_from_camera, double time_s, double focal_length,
-             const double* x, const double* y, std::size_t count, float weight, float* sum) const;
+  // pupil: in the camera frame, m.
+  void shade(const Eigen::Matrix3d& base_from_camera, const Eigen::Vector3d& pupil, double time_s,
+             double focal_length, const double* x, const double* y, std::size_t count, float weight,
+             float* sum) const;
 
  private:
   struct Layer {
@@ -53,8 +59,9 @@ class Scene {
   };
   struct Patch {
     PatchConfig config;
-    Eigen::Vector2d half_size;  // of the whole patch, in patch coordinates
-    std::vector<Layer> layers;  // the densest first
+    Eigen::Vector2d half_size;      // of the whole patch, in patch coordinates
+    std::vector<Layer> layers;      // the densest first
+    std::optional<DepthMap> depth;  // nothing: infinitely far
   };
 
   void add_photo(const PatchConfig& config, const cv::Mat& photo, const std::vector<Sight>& sights,
@@ -68,7 +75,19 @@ class Scene {
   [[nodiscard]] static float zoomed_sample(const Patch& patch, std::size_t layer, double level,
                                            const Eigen::Vector2d& point);
 
+  // Clouds and water take what they cover of the block's rays.
+  void add_clouds_and_water(const Eigen::Matrix3d& base_from_camera, double time_s, const double* x,
+                            const double* y, std::size_t size, float* shine, float* open) const;
+
+  // Shifts a place of a patch, in patch coordinates.
+  void flutter(const FlutterConfig& config, double time_s, std::uint64_t seed, double* right,
+               double* down) const;
+
   float background_;
+  std::optional<Clouds> clouds_;
+  std::optional<Water> water_;
+  double longest_focal_length_;  // px
+  std::uint64_t flutter_seed_;
   bool zooms_;
   std::vector<Patch> patches_;
 };

@@ -1,7 +1,9 @@
 #pragma once
-// What the virtual pan/tilt head reports: the true angle, scaled, noisy, rounded, sometimes old.
+// What the virtual pan/tilt head reports: the angle that its encoder sees (with play not quite the camera's: played_path.h), scaled,
+// off by its gear, noisy, rounded, sometimes old.
 //
-//   measured = round(wrap(scale * wrap(true angle) + N(0, sigma)) / quantum) * quantum   (PTCEE 17)
+//   measured = round(wrap(scale * wrap(angle) + gear(angle) + N(0, sigma)) / quantum) * quantum   (PTCEE 17)
+//   gear(angle) = sum of amplitude * sin(2 pi angle / period + phase)
 //
 // With internal_rate_hz the head refreshes its value at multiples of that period and repeats it in
 // between: the value is then up to one such period old, half of it on average, and so much is to be
@@ -12,6 +14,7 @@
 #include <cstdint>
 #include <optional>
 #include <random>
+#include <vector>
 
 #include "test/simulator/path.h"
 #include "test/simulator/zoom.h"
@@ -20,6 +23,9 @@ namespace alidade::simulator {
 
 // Into [-pi, pi).
 [[nodiscard]] double wrapped(double angle);
+
+// The sum over a gear's harmonics, rad.
+[[nodiscard]] double gear_error(const std::vector<GearHarmonic>& gear, double angle);
 
 class Telemetry {
  public:

@@ -81,6 +81,37 @@ TEST(VirtualTelemetry, RoundsToTheQuantum) {
   }
 }
 
+TEST(VirtualTelemetry, IsOffByTheSumOfItsGearsHarmonics) {
+  const Turning path;
+  Config config;
+  config.camera.pan_scale = 1.02;
+  config.telemetry.pan_gear = {{3e-4, 0.05, 0.4}, {1e-4, 0.011, -2}};
+  config.telemetry.tilt_gear = {{2e-4, 1.3, 0}};
+  Telemetry telemetry(config, path);
+  for (int i = 0; i < 300; ++i) {
+    const double time = 0.0137 * i;
+    const Angles angles = telemetry.measure(time);
+    const double pan = 0.1 * time;
+    const double expected = 3e-4 * std::sin(2 * kTelemetryPi * pan / 0.05 + 0.4) +
+                            1e-4 * std::sin(2 * kTelemetryPi * pan / 0.011 - 2);
+    EXPECT_NEAR(angles.pan - 1.02 * pan, expected, 1e-12);
+    EXPECT_NEAR(angles.tilt - 0.25, 2e-4 * std::sin(2 * kTelemetryPi * 0.25 / 1.3), 1e-12);
+  }
+}
+
+TEST(VirtualTelemetry, RoundsWhatItsGearHasMadeOfTheAngle) {
+  const Turning path;
+  Config config;
+  config.telemetry.pan_gear = {{3e-4, 0.05, 0}};
+  Telemetry exact(config, path);
+  config.telemetry.quantum = 2e-4;
+  Telemetry rounded(config, path);
+  for (int i = 0; i < 300; ++i) {
+    const double pan = exact.measure(0.0137 * i).pan;
+    EXPECT_NEAR(rounded.measure(0.0137 * i).pan, std::round(pan / 2e-4) * 2e-4, 1e-12);
+  }
+}
+
 TEST(VirtualTelemetry, RepeatsItsValueBetweenInternalRefreshes) {
   const Turning path;
   Config config;

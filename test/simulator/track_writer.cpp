@@ -6,6 +6,7 @@
 #include <random>
 #include <utility>
 
+#include "test/simulator/noise_field.h"
 #include "test/simulator/random.h"
 #include "test/simulator/scene.h"
 #include "test/simulator/truth.h"
@@ -22,6 +23,15 @@ int coarser_grids(int row, int column, int octave) {
   int count = 0;
   while (count < octave && (row >> count) % 2 == 0 && (column >> count) % 2 == 0) ++count;
   return count;
+}
+
+// Of the landmark at a place of the grid, 1/m.
+double inverse_distance(const Config& config, const std::pair<int, int>& place) {
+  const auto& distance = config.recording.landmark_distance;
+  if (!distance) return 0;
+  const std::uint64_t seed = mix(config.seed, static_cast<std::uint64_t>(Stream::kDepth));
+  const double part = (1 + lattice_value(place.first, place.second, 0, seed)) / 2;
+  return std::pow(distance->nearest / distance->farthest, part) / distance->nearest;
 }
 
 }  // namespace
@@ -47,7 +57,7 @@ std::vector<TrackedPoint> make_tracks(const Config& config, const std::vector<Fr
     const double reach =
         0.55 * std::atan2(std::hypot(config.image.width, config.image.height), focal_length) +
         2 * spacing;
-    const Eigen::Vector3d axis = camera.base_from_camera_at(event.capture_s).col(2);
+    const Eigen::Vector3d axis = camera.world_from_camera_at(event.capture_s).col(2);
     const double azimuth = std::atan2(axis.y(), axis.x());
     const double elevation = -std::asin(std::clamp(axis.z(), -1.0, 1.0));
     const auto row_of = [&](double angle) {
@@ -60,15 +70,16 @@ std::vector<TrackedPoint> make_tracks(const Config& config, const std::vector<Fr
       for (int column = row_of(azimuth - sideways); column <= row_of(azimuth + sideways);
            ++column) {
         if (coarser_grids(row, column, octave) >= kLandmarkOctaves) continue;
-        const auto seen =
-            camera.project_rolling(direction(column * spacing, row * spacing), event.capture_s);
-        if (!seen) continue;
         // In steps of the finest grid.
         const int finest = 1 << (kMostOctaves - octave);
         const std::pair<int, int> place{row * finest, (column % around + around) % around * finest};
+        const double inverse = inverse_distance(config, place);
+        const auto seen = camera.project_rolling(direction(column * spacing, row * spacing),
+                                                 event.capture_s, inverse);
+        if (!seen) continue;
         const int number = numbers.emplace(place, static_cast<int>(numbers.size())).first->second;
         const double u = seen->x() + noise(generator);
-        tracks.push_back({event.frame, number, u, seen->y() + noise(generator)});
+        tracks.push_back({event.frame, number, u, seen->y() + noise(generator), inverse});
       }
     }
   }
@@ -79,11 +90,20 @@ void write_tracks(const Config& config, const std::vector<FrameEvent>& frames,
                   const CameraModel& camera, const std::filesystem::path& file) {
   OutputFile output(file);
   output.stream() << "frame,landmark,u_px,v_px,sigma_px\n";
+  std::map<int, double> inverse_distances;
   for (const TrackedPoint& point : make_tracks(config, frames, camera)) {
+    inverse_distances.emplace(point.landmark, point.inverse_distance);
     output.stream() << point.frame << ',' << point.landmark << ',' << point.u << ',' << point.v
                     << ',' << config.recording.pixel_sigma << '\n';
   }
   output.flush();
+  if (!config.recording.landmark_distance) return;
+  OutputFile landmarks(file.parent_path() / "truth_landmarks.csv");
+  landmarks.stream() << "landmark,inverse_distance_per_m\n";
+  for (const auto& [landmark, inverse] : inverse_distances) {
+    landmarks.stream() << landmark << ',' << inverse << '\n';
+  }
+  landmarks.flush();
 }
 
 }  // namespace alidade::simulator

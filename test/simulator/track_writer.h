@@ -22,7 +22,8 @@ inline constexpr int kLandmarkOctaves = 3;
 struct TrackedPoint {
   std::int64_t frame = 0;
   int landmark = 0;
-  double u = 0, v = 0;  // px, with noise of config.recording.pixel_sigma
+  double u = 0, v = 0;          // px, with noise of config.recording.pixel_sigma
+  double inverse_distance = 0;  // 1/m, of the landmark
 };
 
 // By frame.
@@ -30,6 +31,7 @@ struct TrackedPoint {
                                                     const std::vector<FrameEvent>& frames,
                                                     const CameraModel& camera);
 
+// With landmark distances also truth_landmarks.csv beside it: landmark,inverse_distance_per_m.
 // Throws std::runtime_error naming the file if it cannot be written.
 void write_tracks(const Config& config, const std::vector<FrameEvent>& frames,
                   const CameraModel& camera, const std::filesystem::path& file);

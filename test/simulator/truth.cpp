@@ -1,7 +1,9 @@
 #include "test/simulator/truth.h"
 
 #include <Eigen/Geometry>
+#include <array>
 #include <iomanip>
+#include <sstream>
 #include <stdexcept>
 #include <utility>
 
@@ -38,9 +40,7 @@ void write_centre_offset(const ImageConfig& image, const Lens& lens, std::ofstre
 
 void write_zoom(const Config& config, const Zoom& zoom, std::ofstream& out) {
   constexpr int kSamples = 129;
-  out << "centre_offset: {value: ";
-  write_centre_offset(config.image, zoom.lens(0), out);
-  out << ", sigma: [0, 0]}\nzoom: " << zoom.reading(0) << "\nzoom_samples:\n";
+  out << "zoom: " << zoom.reading(0) << "\nzoom_samples:\n";
   const ZoomConfig::Ends& ends = config.zoom->reading;
   for (int i = 0; i < kSamples; ++i) {
     const double reading = ends.wide + (ends.tele - ends.wide) * i / (kSamples - 1);
@@ -50,6 +50,61 @@ void write_zoom(const Config& config, const Zoom& zoom, std::ofstream& out) {
     write_centre_offset(config.image, lens, out);
     out << "}\n";
   }
+}
+
+void write_gear(const std::vector<GearHarmonic>& gear, std::ostream& out) {
+  out << '[';
+  for (const GearHarmonic& harmonic : gear) {
+    out << (&harmonic == &gear.front() ? "" : ", ") << "{amplitude: " << harmonic.amplitude
+        << ", period: " << harmonic.period << ", phase: " << harmonic.phase << '}';
+  }
+  out << ']';
+}
+
+// What a calibration has no name for; nothing where the camera is as the model has it.
+void write_departures(const Config& config, std::ofstream& out) {
+  const TelemetryConfig& telemetry = config.telemetry;
+  const CameraConfig& camera = config.camera;
+  std::ostringstream lines;
+  lines << std::setprecision(15);
+  if (camera.radial_distortion_2 != 0) {
+    lines << "  radial_distortion_2: " << camera.radial_distortion_2 << '\n';
+  }
+  if (!camera.tangential.isZero(0)) {
+    lines << "  tangential_distortion: [" << camera.tangential.x() << ", " << camera.tangential.y()
+          << "]\n";
+  }
+  if (!camera.sway.empty()) {
+    constexpr std::array<const char*, 3> kAxes{"forward", "right", "down"};
+    lines << "  sway:\n";
+    for (const Swing& swing : camera.sway) {
+      lines << "    - {axis: " << kAxes.at(static_cast<std::size_t>(swing.axis))
+            << ", amplitude: " << swing.amplitude << ", frequency: " << swing.frequency
+            << ", phase: " << swing.phase << "}\n";
+    }
+  }
+  if (!camera.pupil.isZero(0)) {
+    lines << "  pupil: [" << camera.pupil.x() << ", " << camera.pupil.y() << ", "
+          << camera.pupil.z() << "]\n";
+  }
+  if (const Breathing& breathing = camera.breathing; breathing.part != 0) {
+    lines << "  breathing: {type: "
+          << (breathing.type == Breathing::Type::kLinear ? "linear" : "sine")
+          << ", part: " << breathing.part << ", period: " << breathing.period << "}\n";
+  }
+  if (!telemetry.pan_gear.empty() || !telemetry.tilt_gear.empty()) {
+    lines << "  gear: {pan: ";
+    write_gear(telemetry.pan_gear, lines);
+    lines << ", tilt: ";
+    write_gear(telemetry.tilt_gear, lines);
+    lines << "}\n";
+  }
+  if (const PlayConfig& play = telemetry.play; play.pan > 0 || play.tilt > 0) {
+    lines << "  play: {pan: " << play.pan << ", tilt: " << play.tilt
+          << ", encoder: " << (play.encoder == PlayConfig::Encoder::kMotor ? "motor" : "output")
+          << "}\n";
+  }
+  if (!lines.str().empty()) out << "departures:\n" << lines.str();
 }
 
 }  // namespace
@@ -75,7 +130,13 @@ void write_truth_yaml(const std::filesystem::path& file, const Config& config,
   value("pan_scale", config.camera.pan_scale);
   value("tilt_scale", config.camera.tilt_scale);
   value("clock_offset", config.camera.clock_offset);
+  if (camera.zoom() != nullptr || !config.camera.centre.isZero(0)) {
+    output.stream() << "centre_offset: {value: ";
+    write_centre_offset(config.image, lens, output.stream());
+    output.stream() << ", sigma: [0, 0]}\n";
+  }
   if (camera.zoom() != nullptr) write_zoom(config, *camera.zoom(), output.stream());
+  write_departures(config, output.stream());
   output.flush();
 }
 
@@ -97,11 +158,13 @@ void write_lens_yaml(const std::filesystem::path& file, const Config& config) {
   output.flush();
 }
 
-TruthCsv::TruthCsv(const std::filesystem::path& file, std::optional<Zoom> zoom)
-    : file_(file), zoom_(std::move(zoom)) {
+TruthCsv::TruthCsv(const std::filesystem::path& file, const CameraModel& camera)
+    : file_(file), camera_(&camera), tells_lens_(camera.zoom() != nullptr || camera.breathes()) {
   file_.stream() << "frame,time_s,pan_rad,tilt_rad,sequence,sender_time_s,stamp_time_s"
-                 << (zoom_ ? ",focal_length_px,radial_distortion,centre_u_px,centre_v_px,zoom" : "")
-                 << '\n';
+                 << (tells_lens_ ? ",focal_length_px,radial_distortion,centre_u_px,centre_v_px"
+                                 : "")
+                 << (camera.zoom() != nullptr ? ",zoom" : "")
+                 << (camera.sways() ? ",q_x,q_y,q_z,q_w" : "") << '\n';
 }
 
 void TruthCsv::add(const FrameEvent& event, const Angles& angles, double origin_s) {
@@ -109,10 +172,15 @@ void TruthCsv::add(const FrameEvent& event, const Angles& angles, double origin_
   out << event.frame << ',' << origin_s + event.capture_s << ',' << wrapped(angles.pan) << ','
       << wrapped(angles.tilt) << ',' << event.sequence << ',' << origin_s + event.sender_s << ','
       << origin_s + event.stamp_s;
-  if (zoom_) {
-    const Lens lens = zoom_->lens(event.capture_s);
+  if (tells_lens_) {
+    const Lens lens = camera_->lens_at(event.capture_s);
     out << ',' << lens.focal_length << ',' << lens.radial_distortion << ',' << lens.centre.x()
-        << ',' << lens.centre.y() << ',' << zoom_->reading(event.capture_s);
+        << ',' << lens.centre.y();
+  }
+  if (const Zoom* zoom = camera_->zoom()) out << ',' << zoom->reading(event.capture_s);
+  if (camera_->sways()) {
+    const Eigen::Quaterniond q(camera_->world_from_camera_at(event.capture_s));
+    out << ',' << q.x() << ',' << q.y() << ',' << q.z() << ',' << q.w();
   }
   out << '\n';
 }

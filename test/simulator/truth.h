@@ -10,16 +10,18 @@
 //   sequence     counts the lost frames too
 //   sender_time_s       the same moment on the sender's own, perhaps skewed clock
 //   stamp_time_s        recording: the stamp in frames.csv; live: when the frame is handed out
-//   focal_length_px, radial_distortion, centre_u_px, centre_v_px, zoom   with a zoom: the true lens at that time, and the true
-//                       reading, between steps too
+//   focal_length_px, radial_distortion, centre_u_px, centre_v_px   with a zoom or where it breathes: the true lens at that time
+//   q_x, q_y, q_z, q_w   where the mast sways: the camera's true orientation in the world (R_world_from_camera) at that time; pan and
+//                tilt are then those of the head in its base
+//   zoom         with a zoom: the true reading, between steps too
 // With a zoom truth.yaml tells the lens at time 0, its reading (zoom), and besides zoom_samples, a list over the whole range of what
 // the lens is at a reading (zoom, focal_length, radial_distortion, centre_offset) if it comes back exactly.
+// What a camera is beyond a calibration's names stands under `departures`, in SI, only where it is stated (README.md).
 // Before a pattern truth.yaml holds the lens under the names of lens.yaml, and truth.csv the camera's pose in the pattern's frame
 // (x_m, y_m, z_m, q_x, q_y, q_z, q_w) in place of angles.
 
 #include <filesystem>
 #include <fstream>
-#include <optional>
 
 #include "test/simulator/camera_model.h"
 #include "test/simulator/pattern_camera.h"
@@ -49,14 +51,16 @@ class OutputFile {
 
 class TruthCsv {
  public:
-  explicit TruthCsv(const std::filesystem::path& file, std::optional<Zoom> zoom = std::nullopt);
+  // The camera must outlive this.
+  TruthCsv(const std::filesystem::path& file, const CameraModel& camera);
   // The times of the event are shifted by origin_s: 0 in a recording.
   void add(const FrameEvent& event, const Angles& angles, double origin_s);
   void flush() { file_.flush(); }
 
  private:
   OutputFile file_;
-  std::optional<Zoom> zoom_;
+  const CameraModel* camera_;
+  bool tells_lens_;
 };
 
 // The same before a pattern.

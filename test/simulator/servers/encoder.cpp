@@ -81,7 +81,7 @@ struct VideoEncoder::Codec {
 VideoEncoder::VideoEncoder() = default;
 VideoEncoder::~VideoEncoder() = default;
 
-bool VideoEncoder::open(Standard standard, int width, int height, double rate_hz,
+bool VideoEncoder::open(Standard standard, int width, int height, double rate_hz, const Rate& rate,
                         std::string* error) {
   codec_.reset();
   if (width <= 0 || height <= 0 || width % 2 != 0 || height % 2 != 0) {
@@ -107,13 +107,19 @@ bool VideoEncoder::open(Standard standard, int width, int height, double rate_hz
   context.color_range = AVCOL_RANGE_JPEG;
   context.framerate = av_d2q(rate_hz, 100000);
   context.time_base = av_inv_q(context.framerate);
-  context.gop_size = std::max(1, static_cast<int>(std::lround(rate_hz)));
+  context.gop_size = rate.gop > 0 ? rate.gop : std::max(1, static_cast<int>(std::lround(rate_hz)));
   context.max_b_frames = 0;
   context.thread_count = 1;
   context.log_level_offset = AV_LOG_VERBOSE - AV_LOG_INFO;  // x264 is talkative
   av_opt_set(context.priv_data, "preset", "superfast", 0);
   av_opt_set(context.priv_data, "tune", "zerolatency", 0);
-  av_opt_set(context.priv_data, "crf", "20", 0);
+  if (rate.kbit_s > 0) {
+    context.bit_rate = std::int64_t{1000} * rate.kbit_s;
+    context.rc_max_rate = context.bit_rate;
+    context.rc_buffer_size = 1000 * rate.kbit_s;
+  } else {
+    av_opt_set(context.priv_data, "crf", "20", 0);
+  }
   av_opt_set(context.priv_data, "forced-idr", "1", 0);
   if (h265) {
     av_opt_set(context.priv_data, "x265-params",

@@ -4,7 +4,7 @@
 // encode_jpeg makes what RFC 2435 can carry: baseline, standard Huffman tables, YUV 4:2:0 (type 1)
 // with grey chroma. VideoEncoder makes Annex B access units of H.264 or H.265 without delay (no B frames,
 // no look-ahead): the picture that went in comes out of the same call. An IDR with parameter sets begins
-// every second of frames, so a viewer can join within a second. Luma is full range (0..255) in
+// every second of frames unless stated, so a viewer can join within a second. Luma is full range (0..255) in
 // both. Row v of the picture starts at gray + v * stride (bytes). Both allocate. encode_jpeg may be
 // called from any thread; an VideoEncoder belongs to one at a time.
 
@@ -29,9 +29,18 @@ class VideoEncoder {
   VideoEncoder(const VideoEncoder&) = delete;
   VideoEncoder& operator=(const VideoEncoder&) = delete;
 
+  struct Rate {
+    int kbit_s = 0;  // on average over about a second; 0: what a constant quality takes
+    int gop = 0;     // pictures from one IDR to the next; 0: a second of them
+  };
+
   // width and height must be even (4:2:0). On failure says why in *error.
   [[nodiscard]] bool open(Standard standard, int width, int height, double rate_hz,
-                          std::string* error);
+                          std::string* error) {
+    return open(standard, width, height, rate_hz, Rate(), error);
+  }
+  [[nodiscard]] bool open(Standard standard, int width, int height, double rate_hz,
+                          const Rate& rate, std::string* error);
 
   // One access unit; empty only if the encoder failed. force_idr starts a new sequence here.
   [[nodiscard]] std::vector<std::uint8_t> encode(const std::uint8_t* gray, std::ptrdiff_t stride,

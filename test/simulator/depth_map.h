@@ -1,0 +1,84 @@
+#pragma once
+// How far away a patch's places are, and what a pupil off the axes' crossing sees of them.
+//
+// The place that is in direction d from where the axes meet stands at distance D(d) from there. D is one number, or goes between
+// nearest and farthest as the place's own smooth noise does, by ratio; or it has so many layers. A ray p + s r (pupil p, unit
+// vector r, both in the patch's frame) meets the sphere of radius D where s D^-1 = t, t = sqrt(1 - e^2 + (e r)^2) - e r,
+// e = p / D: the direction seen is r + e / t. Smooth: D of the direction that is found, over and over until it stays (the shift must be
+// smaller than what D changes over). Layers: the nearest one that the ray meets where that layer or a nearer one is; behind a nearer one's
+// edge its own picture goes on. Thread-safe, no allocation.
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+#include "test/simulator/config.h"
+#include "test/simulator/noise_field.h"
+
+namespace alidade::simulator {
+
+class DepthMap {
+ public:
+  DepthMap(const DistanceConfig& config, std::uint64_t seed) : config_(config), seed_(seed) {}
+
+  [[nodiscard]] double nearest() const { return config_.nearest; }
+
+  // 1/m, of a place in patch coordinates.
+  [[nodiscard]] double inverse_distance(const Eigen::Vector2d& place) const {
+    if (config_.layers > 0) return inverse_of_layer(layer_at(place));
+    return inverse(part(place));
+  }
+
+  // Patch coordinates of what a ray sees; coordinates(v): those of a vector in the patch's frame.
+  template <class Coordinates>
+  [[nodiscard]] Eigen::Vector2d seen(const Eigen::Vector3d& ray, const Eigen::Vector3d& pupil,
+                                     const Coordinates& coordinates) const {
+    const Eigen::Vector3d r = ray.normalized();
+    const auto met = [&](double inverse_distance) {
+      const Eigen::Vector3d e = pupil * inverse_distance;
+      const double along = e.dot(r);
+      const double t = std::sqrt(1 - e.squaredNorm() + along * along) - along;
+      return coordinates(Eigen::Vector3d(r + e / t));
+    };
+    if (config_.layers == 0) {
+      Eigen::Vector2d place = coordinates(r);
+      for (int step = 0; step < kMostSteps && !place.hasNaN(); ++step) {
+        const Eigen::Vector2d before = place;
+        place = met(inverse_distance(before));
+        if ((place - before).squaredNorm() < kSettled) break;
+      }
+      return place;
+    }
+    for (int layer = 0; layer + 1 < config_.layers; ++layer) {
+      const Eigen::Vector2d place = met(inverse_of_layer(layer));
+      if (place.hasNaN() || layer_at(place) <= layer) return place;
+    }
+    return met(inverse_of_layer(config_.layers - 1));
+  }
+
+ private:
+  static constexpr int kMostSteps = 12;
+  static constexpr double kSettled = 1e-16;  // rad^2
+
+  // 0 = nearest, 1 = farthest.
+  [[nodiscard]] double part(const Eigen::Vector2d& place) const {
+    if (config_.farthest <= config_.nearest) return 0;
+    const Eigen::Vector2d cell = place / config_.length;
+    return std::clamp(0.5 + 0.8 * smooth_noise(cell.x(), cell.y(), seed_), 0.0, 1.0);
+  }
+  [[nodiscard]] int layer_at(const Eigen::Vector2d& place) const {
+    return std::min(static_cast<int>(part(place) * config_.layers), config_.layers - 1);
+  }
+  [[nodiscard]] double inverse_of_layer(int layer) const {
+    return inverse(config_.layers > 1 ? layer / static_cast<double>(config_.layers - 1) : 0);
+  }
+  [[nodiscard]] double inverse(double part) const {
+    return std::pow(config_.nearest / config_.farthest, part) / config_.nearest;
+  }
+
+  DistanceConfig config_;
+  std::uint64_t seed_;
+};
+
+}  // namespace alidade::simulator
