@@ -17,7 +17,7 @@ namespace alidade {
 
 struct KnownValue {
   CalibrationPrior prior;
-  bool wanted = false;  // false: not known, or given elsewhere
+  bool wanted = false;  // false: unknown, or CalibrationOptions already has it
 };
 
 // For images of the recording's size. Units as in CalibrationOptions.

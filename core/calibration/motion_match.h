@@ -2,7 +2,7 @@
 // Clock offset and focal length from motion alone, without a guess. Over some 0.5 s the image moves
 // by
 //   (-f cos(tilt) dpan, f dtilt).
-// d is the shift at which the tracks' median motion correlates best with the telemetry's. f is the
+// The clock offset d is the shift of time at which the tracks' median motion correlates best with the telemetry's. f is the
 // ratio of the two motions there. Medians and the normalised correlation need neither a guess of f
 // nor clean tracks.
 // Small tilt and nominal axes are assumed: good to some percent, which the robust adjustment
@@ -29,7 +29,7 @@ struct MotionMatch {
   double focal_length = 0;
   double correlation = 0;  // of the motions, 1 = perfect
   bool at_edge = false;    // of the range that was searched
-  bool apart = false;      // no shift covers half of the video's motion with telemetry
+  bool apart = false;      // at each shift most of the image's motions lack telemetry
   double centre_s = 0;     // centre of the search
   double half_range_s = 0;
 };
@@ -46,8 +46,8 @@ struct ReversedAxes {
   bool tilt = false;
 };
 
-// The axes to reverse so that telemetry leaves much less of the image's motion unexplained than it
-// does as it is, `match`. None if the recording does not show it. Takes three times as long as
+// The axes whose reversal explains much more of the image's motion. match: the result without
+// reversal. None if the recording does not show it. Takes three times as long as
 // match_motion().
 [[nodiscard]] ReversedAxes reversed_axes(const std::vector<ImageMotion>& motion,
                                          const TrajectorySpline& telemetry,

@@ -6,7 +6,7 @@
 
 namespace alidade {
 
-// The finite decimal number that the whole text gives; empty: it gives none.
+// The text's value; empty unless all of it is one finite decimal number.
 [[nodiscard]] std::optional<double> number_of(const std::string& text);
 
 // The shortest text that reads back as the same bits: 55.4 rather than 55.399999999999999.

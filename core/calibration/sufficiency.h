@@ -6,7 +6,7 @@
 //                  that the data leave (nearly) open; a scale that cannot be separated from the
 //                  focal length; axes and scales that rest on the prior; the weakest direction
 //                  in words
-// The limits are those of use: a calibration serves to point a pixel. Allocates.
+// The limits follow from the purpose: directions of pixels must be good enough. Allocates.
 
 #include <string>
 #include <vector>
@@ -22,7 +22,8 @@ namespace alidade::internal {
                                              const MotionMatch& match,
                                              const CalibrationInput& input, std::string* why);
 
-// A question for the user if the focal length from motion (px) makes degrees likely; else empty.
+// Asks whether telemetry is in degrees, if the focal length that motion gives (px) suggests it;
+// else empty.
 [[nodiscard]] std::string ask_for_degrees(double focal_length, int width);
 
 // The extent of the motion, true angles.
@@ -31,7 +32,8 @@ struct MotionExtent {
   Vector2<double> largest_rate;  // rad/s
   Vector2<double> varying_rate;  // rad/s, standard deviation of the rate
 };
-// times_s: of the images. Before and after them only noisy telemetry holds the trajectory.
+// times_s: of the images. Outside their span nothing is measured, as the
+// trajectory rests on noisy telemetry alone there.
 [[nodiscard]] MotionExtent measure_motion(const TrajectorySpline& trajectory,
                                           const std::vector<double>& times_s);
 

@@ -1,10 +1,10 @@
 #pragma once
 // FrameWarp: where pixels of one frame are in an earlier one, by both frames' orientations and
 // lenses, each pixel at its own row's time: u_then = pixel_then(direction_now(u_now)).
-// Exact at nodes some 128 px apart, cubic between them at the corners of tiles of kTile x kTile
-// pixels, linear within a tile. With 7 % distortion in the corner and frames half a picture apart
-// the error is below 0.04 px (comparison_test). A frame with a node that has no pixel is refused as
-// a whole. The constructor takes all memory. For one thread.
+// Computed exactly at nodes some 128 px apart; from these cubically interpolated to the corners of
+// tiles of kTile x kTile pixels, and linearly within a tile. With 7 % distortion in the corner and
+// frames half a picture apart the error is below 0.04 px (comparison_test). to() refuses a frame
+// that does not show the directions of all nodes. The constructor takes all memory. One thread.
 
 #include <vector>
 

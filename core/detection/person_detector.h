@@ -20,7 +20,7 @@ namespace alidade {
 
 struct PersonOptions {
   double height_m = 1.75;         // of people
-  double height_tolerance = 0.2;  // |log| of a person's height over height_m
+  double height_tolerance = 0.2;  // largest |log(a person's height / height_m)|
   double height_step = 1.1;       // largest ratio of heights in px within a band; > 1
   double least_height_px = 48;
   double most_height_px = 480;

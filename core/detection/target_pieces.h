@@ -1,9 +1,9 @@
 #pragma once
 // join_target_pieces(): a target that is large for its speed changes the picture only along its
-// outline, because its even inside covers itself in the earlier pictures. Pieces of the outline
-// stand around the unchanged inside, whose grey level most changed pixels of one piece show as
-// well. Two boxes are of one thing if
-//   |g - m| < c / 3   for three quarters of the pixels between, and
+// outline, because its even inside covers itself in the earlier pictures. So pieces of the
+// outline are found around an unchanged inside. In at least one piece, most changed pixels have the
+// grey level of the inside. Two boxes are of one thing if
+//   |g - m| < c / 3   for three quarters of the pixels between the boxes, and
 //   |g - m| < c / 2   for most changed pixels of one of the boxes
 // g: grey level, m: its median on the line between the boxes' middles, c: mean change of the box's
 // changed pixels. Conditions and limits: docs/derivations.md.
@@ -16,8 +16,8 @@
 
 namespace alidade {
 
-// Joins boxes of one thing up to most_size_px; the others keep their order. z: row by row, as the
-// boxes were made from (change_regions.h). sigma_grey: grey levels of a difference with z = 1 in an
+// Joins boxes of one thing up to most_size_px; the others keep their order. z: row by row, the
+// values that the boxes were made from (change_regions.h). sigma_grey: grey levels of a difference with z = 1 in an
 // even area.
 void join_target_pieces(const SmoothedView& now, const std::int16_t* z, double sigma_grey,
                         const ChangeOptions& options, std::vector<DetectionBox>* boxes);

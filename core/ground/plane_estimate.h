@@ -13,7 +13,7 @@ namespace alidade {
 
 struct PlaneEstimate {
   WorldPlane plane;
-  std::optional<GeodeticPosition> origin;  // of w; x is then east, y north
+  std::optional<GeodeticPosition> origin;  // of the world frame w; if given, x is east, y north
 };
 
 // heading, pitch, roll of the base (rad, BaseAttitude); x, y, height of the camera (m).
@@ -35,7 +35,7 @@ struct PlaneValues {
   J.topLeftCorner<3, 3>() = attitude_jacobian(attitude).inverse();
   out.covariance = J * plane.covariance * J.transpose();
   out.covariance = (out.covariance + out.covariance.transpose()).eval() / 2;
-  // A heading that the base defines has no variance except rounding.
+  // If the base itself defines heading 0, its variance is only rounding.
   if (out.covariance(0, 0) < 1e-20 * out.covariance.topLeftCorner<3, 3>().trace()) {
     out.covariance.row(0).setZero();
     out.covariance.col(0).setZero();

@@ -10,7 +10,7 @@ namespace alidade {
 
 // The word of `known` with the fewest slips from `typed`. A slip is a letter left out, added,
 // replaced, or exchanged with its neighbour. Of equally near words the first is taken. Empty if
-// each word needs more than one slip in three letters of the longer of the two words.
+// no word is within one slip for each three letters of the longer of the two.
 [[nodiscard]] std::optional<std::string> nearest_word(const std::string& typed,
                                                       const std::vector<std::string>& known);
 

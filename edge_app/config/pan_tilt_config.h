@@ -27,8 +27,8 @@ struct PanTiltConfig {
   // onvif: deg, the angles at both ends of the device's scale (-1 and 1 in the generic space).
   std::optional<std::array<double, 2>> pan_range_deg;
   std::optional<std::array<double, 2>> tilt_range_deg;
-  // onvif: the positions that the device reports at these angles. Given only if they are neither -1
-  // and 1 nor the range that the device declares.
+  // onvif: the positions that the device reports at these angles. Needed only if they differ
+  // from -1 and 1 and from the range that the device declares.
   std::optional<std::array<double, 2>> pan_scale;
   std::optional<std::array<double, 2>> tilt_scale;
   double rate_hz = 30;                    // polls a second; default for onvif: 10

@@ -25,9 +25,9 @@ struct VideoConfig {
   std::string device;                      // v4l2: /dev/video0
   std::optional<V4l2Format> pixel_format;  // v4l2; empty: the first that fits
   double rate_hz = 0;                      // v4l2; 0: the device's own
-  int width = 0;                           // px, required of live video; 0: any
-  int height = 0;                          // px, likewise
-  std::string user;                        // rtsp, mjpeg
+  int width = 0;     // px; 0: any. Live video needs it until there is a calibration
+  int height = 0;    // px, likewise
+  std::string user;  // rtsp, mjpeg
   std::string password;
   LinkRules rules;                        // rtsp, mjpeg
   Transport transport = Transport::kTcp;  // rtsp

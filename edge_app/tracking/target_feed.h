@@ -2,7 +2,7 @@
 // TargetFeed: a TargetStage on a niced thread of its own, behind a bounded queue. offer() answers
 // at once whether detections are taken; nobody waits for the thread, and the threads on a record's
 // way do not depend on it. The stage may still refuse a frame that offer() has taken, for example a
-// late frame that came before. Such refusals are counted.
+// late frame that it already had. Such refusals are counted.
 
 #include <condition_variable>
 #include <deque>

@@ -3,7 +3,7 @@
 // a grid of rate_hz, or slower if the serial line cannot carry that. One query is outstanding at a
 // time; an answer later than the next grid point shifts the grid. A sample was true between the
 // sending of the query and the first byte of its answer. Protocols that report one axis at a time
-// give a sample per tilt, with the pan of the same moment (AxisPairing). Angles are mapped by sign
+// give one sample for each reading of tilt, with pan interpolated to its moment (AxisPairing). Angles are mapped by sign
 // and zero to the model's axes, in [-pi, pi). Late answers: docs/derivations.md.
 // kDisconnected: no link, or no sample within timeout_s and three queries given up; error() says
 // what came instead. The link is then reopened after a growing pause. kFailed: an address or a
@@ -91,11 +91,12 @@ class QuerySource : public PanTiltSource {
   int open_ = 0;                // consecutive unanswered queries; their answers may still come
   double open_since_s_ = 0;     // when the first of these was sent
   bool refused_ = false;        // the latest query was refused by an answer
-  bool fenced_ = false;         // protocol_->doubt() was called; its next query is a fence
-  bool first_is_old_ = false;   // the next answer may belong to a query of the previous connection
-  bool late_awaited_ = false;   // the latest query was given up, and its answer may still come
-  double late_s_ = 0;           // delay of an answer that came after its query was given up; 0:
-                                // none
+  bool fenced_ =
+      false;  // protocol_->doubt() was called; its next query is a fence (query_protocol.h)
+  bool first_is_old_ = false;  // the next answer may belong to a query of the previous connection
+  bool late_awaited_ = false;  // the latest query was given up, and its answer may still come
+  double late_s_ = 0;          // delay of an answer that came after its query was given up; 0:
+                               // none
   bool restarted_ = true;
   std::string problem_;  // what came lately instead of a reading
   SourceNotes notes_;

@@ -2,8 +2,9 @@
 // V4l2Device: one opening of a V4L2 capture device, from negotiation to closing: dequeues filled
 // buffers, lends them and gives them back. Part of V4l2Source. Single-planar capture by mmap
 // streaming. A buffer goes back to the driver when the last owner of hold()'s result is gone, on
-// any thread. Buffers held when the device closes become ordinary memory in the same place: the
-// driver's memory would keep the device open and, after an unplugging, its number in /dev/video*.
+// any thread. At close() ordinary memory with the same content replaces each buffer still held, at
+// the same address: the driver's memory would keep the device open, and once unplugged its number
+// in /dev/video* taken.
 // One thread opens, dequeues and closes; owners may end on any.
 
 #include <sys/types.h>
@@ -57,7 +58,7 @@ class V4l2Device : public std::enable_shared_from_this<V4l2Device> {
   // After kOk call hold() next.
   [[nodiscard]] Result dequeue(Buffer* buffer);
   [[nodiscard]] std::shared_ptr<const void> hold(std::uint32_t index);
-  // True if the driver can do without the buffers held now, for any time.
+  // True if the buffers held now may be kept for any time, as the driver has enough others.
   [[nodiscard]] bool can_lend();
 
   // The negotiated format.
