@@ -10,7 +10,9 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 
 #include "test/simulator/config.h"
@@ -20,7 +22,12 @@ namespace alidade::simulator {
 
 class DepthMap {
  public:
-  DepthMap(const DistanceConfig& config, std::uint64_t seed) : config_(config), seed_(seed) {}
+  DepthMap(const DistanceConfig& config, std::uint64_t seed) : config_(config), seed_(seed) {
+    for (std::size_t i = 0; i < inverses_.size(); ++i) {
+      const double parts = std::max(1, config.layers - 1);
+      inverses_[i] = inverse(static_cast<double>(i) / parts);
+    }
+  }
 
   [[nodiscard]] double nearest() const { return config_.nearest; }
 
@@ -50,14 +57,26 @@ class DepthMap {
       }
       return place;
     }
-    for (int layer = 0; layer + 1 < config_.layers; ++layer) {
+    // Far from the edges of its layer a place is in that one wherever the pupil shifts it to.
+    const Eigen::Vector2d straight = coordinates(r);
+    if (straight.hasNaN()) return straight;
+    const double shift =
+        pupil.norm() * inverses_[0] * (1 + straight.squaredNorm()) / config_.length;
+    const double straight_part = part(straight);
+    const int first = layer_of(straight_part - kSteepest * shift);
+    const int last = layer_of(straight_part + kSteepest * shift);
+    for (int layer = first; layer < last; ++layer) {
       const Eigen::Vector2d place = met(inverse_of_layer(layer));
       if (place.hasNaN() || layer_at(place) <= layer) return place;
     }
-    return met(inverse_of_layer(config_.layers - 1));
+    return met(inverse_of_layer(last));
   }
 
  private:
+  static constexpr std::size_t kMostLayers = 16;
+  static constexpr double kSpread = 0.8;
+  // Of part() over a length: a lattice's values are at most 2 apart, and fade() is at most 15/8 steep, along either axis.
+  static constexpr double kSteepest = kSpread * 2 * 1.875 * 1.4143;
   static constexpr int kMostSteps = 12;
   static constexpr double kSettled = 1e-16;  // rad^2
 
@@ -65,13 +84,14 @@ class DepthMap {
   [[nodiscard]] double part(const Eigen::Vector2d& place) const {
     if (config_.farthest <= config_.nearest) return 0;
     const Eigen::Vector2d cell = place / config_.length;
-    return std::clamp(0.5 + 0.8 * smooth_noise(cell.x(), cell.y(), seed_), 0.0, 1.0);
+    return std::clamp(0.5 + kSpread * smooth_noise(cell.x(), cell.y(), seed_), 0.0, 1.0);
   }
-  [[nodiscard]] int layer_at(const Eigen::Vector2d& place) const {
-    return std::min(static_cast<int>(part(place) * config_.layers), config_.layers - 1);
+  [[nodiscard]] int layer_at(const Eigen::Vector2d& place) const { return layer_of(part(place)); }
+  [[nodiscard]] int layer_of(double part) const {
+    return std::clamp(static_cast<int>(part * config_.layers), 0, config_.layers - 1);
   }
   [[nodiscard]] double inverse_of_layer(int layer) const {
-    return inverse(config_.layers > 1 ? layer / static_cast<double>(config_.layers - 1) : 0);
+    return inverses_[static_cast<std::size_t>(layer)];
   }
   [[nodiscard]] double inverse(double part) const {
     return std::pow(config_.nearest / config_.farthest, part) / config_.nearest;
@@ -79,6 +99,7 @@ class DepthMap {
 
   DistanceConfig config_;
   std::uint64_t seed_;
+  std::array<double, kMostLayers> inverses_{};  // 1/m
 };
 
 }  // namespace alidade::simulator

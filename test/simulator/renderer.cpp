@@ -16,7 +16,7 @@ constexpr int kWaves = 24;
 constexpr int kSpectrumWaves = 96;  // where correlation is to be as asked for
 // Boil is evaluated at every so many columns, and is linear in between.
 constexpr int kBoilStep = 16;
-constexpr int kBoilStepsPerLength = 4;
+constexpr int kBoilStepsPerLength = 2;
 constexpr double kCoveredLight = 0.02;  // what comes through a lens cover
 // Where in a pixel each sub-exposure looks, in the order of time. Opposite points come at opposite
 // times, so that the blur of a moving edge is symmetric; in the larger set, used when motion is to be

@@ -315,11 +315,11 @@ TEST_F(VirtualSensor, HidesAFarPatchBehindANearOneWhateverTheirOrder) {
 }
 
 TEST(VirtualDepth, WhatIsSeenStandsWhereItsDistanceHasIt) {
-  const Eigen::Vector3d pupil(0.04, -0.03, 0.1);
   const auto coordinates = [](const Eigen::Vector3d& v) {
     return Eigen::Vector2d(v.x() / v.z(), v.y() / v.z());
   };
-  for (const int layers : {0, 4}) {
+  for (const auto& [layers, metres] : {std::pair{0, 0.1}, {4, 0.1}, {4, 0.003}}) {
+    const Eigen::Vector3d pupil = metres * Eigen::Vector3d(0.4, -0.3, 1);
     const DepthMap depth({6, 120, layers, 0.1}, 7);
     double nearest = 1e9;
     double farthest = 0;
