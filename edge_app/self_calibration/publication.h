@@ -16,15 +16,15 @@ class Publication {
  public:
   using Object = std::shared_ptr<const PublishedCalibration>;
 
-  // What the real-time thread begins with. clock_holds: see clock_holds().
-  void begin_with(Object first, bool clock_holds) {
+  // What the real-time thread begins with.
+  void begin_with(Object first) {
     present_ = std::move(first);
-    clock_holds_ = clock_holds;
+    clock_holds_ = present_->of_this_connection;
   }
   // A calibration takes the place of the present one.
-  void replace(Object by, bool clock_holds) {
+  void replace(Object by) {
     present_ = next_ = std::move(by);
-    clock_holds_ = clock_holds;
+    clock_holds_ = present_->of_this_connection;
     is_withdrawn_ = false;
     is_fresh_wanted_ = false;
   }

@@ -56,8 +56,8 @@ SelfCalibration::SelfCalibration(const SelfCalibrationOptions& options, Calibrat
   }
   zooms_ = zooms_ || !nodes_.empty();
   first->zoom_curve = nodes_.curve();
-  // A stored one was made over another connection.
-  publication_.begin_with(first, stored == nullptr);
+  first->of_this_connection = stored == nullptr;
+  publication_.begin_with(first);
 }
 
 void SelfCalibration::begin_anew() {
@@ -189,7 +189,7 @@ void SelfCalibration::publish(const CheckedCalibration& checked) {
   for (const std::string& remark : checked.remarks) messages_.say(remark);
   store(checked.result, fresh->map);
   publication_.accept([this](double zoom) { return zoom_.fits(zoom); });
-  publication_.replace(fresh, true);
+  publication_.replace(fresh);
   messages_.forget_said();
   need_ = CalibrationNeed::kNothing;
 }

@@ -123,7 +123,7 @@ void SelfCalibration::look_for_stored() {
   // For a stored one the connection is unknown.
   found->of_this_connection = by_curve && nodes_.clock_is_known();
   messages_.say(fmt::format("zoom {}: the calibration {} holds", *zoom_.reading(), found->name));
-  publication_.replace(found, found->of_this_connection);
+  publication_.replace(found);
   if (!makes_nodes()) contradiction_.restart();
   pace_.watch_after(makes_nodes() ? options_.schedule.next_try_s : options_.schedule.first_watch_s);
   need_ = CalibrationNeed::kNothing;

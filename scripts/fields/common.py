@@ -1,4 +1,4 @@
-"""What both lists share: reading them, OpenAPI, comments of ROS messages, files of which a part is generated."""
+"""What all lists share: reading them, OpenAPI, comments of ROS messages, files of which a part is generated."""
 import pathlib
 import re
 import subprocess
@@ -109,3 +109,23 @@ def between(path, files, begin, end, text):
 
 def clang_formatted(path, text):
     return subprocess.run(["clang-format", f"--assume-filename={TOP / path}"], input=text, capture_output=True, text=True, check=True).stdout
+
+
+def known_to_ros(fields):
+    return [field for field in fields if field["ros"].get("as") != "none"]
+
+
+def target_reader_source(by_line, reader, message, lines):
+    """C++ of the ROS node: the function that fills a message by a reader of target_reader.h."""
+    return "\n".join([f"// {by_line}", "", '#include "alidade_ros/target_reader.h"', "", "namespace alidade_ros {", "",
+                      f"void read_fields(const {reader}& read, alidade_msgs::{message}* message) {{", *lines, "}", "",
+                      "}  // namespace alidade_ros", ""])
+
+
+def files_of(by_line, files, sources, parts):
+    """All files of a list, by path. sources: text of C++ that is generated as a whole. parts: of other files, between their two comments."""
+    own = {path: clang_formatted(path, text) for path, text in sources.items()}
+    for path, text in parts.items():
+        begin, end = (f"<!-- {by_line} -->", "<!-- Until here. -->") if path.endswith(".md") else (f"# {by_line}", "# Until here.")
+        own[path] = between(path, files, begin, end, text)
+    return own

@@ -2,7 +2,8 @@
 import re
 import textwrap
 
-from fields.common import JSON, ListError, between, bounds, by, clang_formatted, description, entries, flow, members_text, properties, ros_lines, sentence
+from fields.common import (JSON, ListError, bounds, by, description, entries, files_of, flow, known_to_ros, members_text, properties, ros_lines,
+                           sentence)
 
 LIST = "edge_app/record/record_fields.yaml"
 BY = by(LIST)
@@ -263,13 +264,13 @@ def ros_source(fields):
 
 def generated(files):
     fields = fields_of_list()
-    known_to_ros = [field for field in fields if field["ros"].get("as") != "none"]
-    ros = "ros_wrapper/alidade_ros"
-    own = {"edge_app/record/record_fields.h": cpp(fields), f"{ros}/include/alidade_ros/record_fields.h": ros_struct(known_to_ros),
-            f"{ros}/src/record_fields.cpp": ros_source(known_to_ros)}
-    own = {path: clang_formatted(path, text) for path, text in own.items()}
-    api, page, msg = "edge_app/output/openapi.yaml", "docs/records.md", "ros_wrapper/alidade_msgs/msg/FrameOrientation.msg"
-    own[api] = between(api, files, f"# {BY}", "# Until here.", openapi(fields))
-    own[page] = between(page, files, f"<!-- {BY} -->", "<!-- Until here. -->", table(fields))
-    own[msg] = between(msg, files, f"# {BY}", "# Until here.", message(known_to_ros))
-    return own
+    to_ros = known_to_ros(fields)
+    return files_of(BY, files, {
+        "edge_app/record/record_fields.h": cpp(fields),
+        "ros_wrapper/alidade_ros/include/alidade_ros/record_fields.h": ros_struct(to_ros),
+        "ros_wrapper/alidade_ros/src/record_fields.cpp": ros_source(to_ros),
+    }, {
+        "edge_app/output/openapi.yaml": openapi(fields),
+        "docs/records.md": table(fields),
+        "ros_wrapper/alidade_msgs/msg/FrameOrientation.msg": message(to_ros),
+    })

@@ -1,12 +1,11 @@
 """The object that has a frame's targets: what JSON writes, the OpenAPI schema, the table, the ROS message and how the ROS node reads it."""
-from fields.common import JSON, ListError, between, by, clang_formatted, description, entries, flow, ros_lines
-from fields.targets import UNITS
+from fields.common import JSON, ListError, by, description, entries, files_of, flow, known_to_ros, ros_lines, target_reader_source
+from fields.targets import READ, UNITS
 
 LIST = "edge_app/tracking/target_list_fields.yaml"
 BY = by(LIST)
 KEYS = {"name", "type", "unit", "null_if", "enum", "says", "more", "value", "ros"}
 TYPES = {"number", "integer", "word", "targets"}
-READ = {"number": "number", "integer": "integer", "word": "word"}
 HEADER = "std_msgs/Header"
 
 
@@ -76,21 +75,19 @@ def message(fields):
 
 
 def ros_source(fields):
-    out = [f"// {BY}", "", '#include "alidade_ros/target_reader.h"', "", "namespace alidade_ros {", "",
-           "void read_fields(const TargetListReader& read, alidade_msgs::Targets* message) {"]
-    out += [f'message->{field["ros"]["name"]} = read.{field["ros"].get("as", READ.get(field["type"]))}("{field["name"]}");' for field in fields]
-    return "\n".join(out + ["}", "", "}  // namespace alidade_ros", ""])
+    lines = [f'message->{field["ros"]["name"]} = read.{field["ros"].get("as", READ.get(field["type"]))}("{field["name"]}");' for field in fields]
+    return target_reader_source(BY, "TargetListReader", "Targets", lines)
 
 
 # ---- files
 
 def generated(files):
     fields = fields_of_list()
-    known_to_ros = [field for field in fields if field["ros"].get("as") != "none"]
-    own = {"edge_app/tracking/target_list_fields.h": cpp(fields), "ros_wrapper/alidade_ros/src/target_list_fields.cpp": ros_source(known_to_ros)}
-    own = {path: clang_formatted(path, text) for path, text in own.items()}
-    api, page, msg = "edge_app/output/openapi.yaml", "docs/target_tracking.md", "ros_wrapper/alidade_msgs/msg/Targets.msg"
-    own[api] = between(api, files, f"# {BY}", "# Until here.", openapi(fields))
-    own[page] = between(page, files, f"<!-- {BY} -->", "<!-- Until here. -->", table(fields))
-    own[msg] = between(msg, files, f"# {BY}", "# Until here.", message(known_to_ros))
-    return own
+    return files_of(BY, files, {
+        "edge_app/tracking/target_list_fields.h": cpp(fields),
+        "ros_wrapper/alidade_ros/src/target_list_fields.cpp": ros_source(known_to_ros(fields)),
+    }, {
+        "edge_app/output/openapi.yaml": openapi(fields),
+        "docs/target_tracking.md": table(fields),
+        "ros_wrapper/alidade_msgs/msg/Targets.msg": message(known_to_ros(fields)),
+    })

@@ -1,7 +1,8 @@
 """Targets: what JSON writes, the OpenAPI schema, the table, the ROS message and how the ROS node reads it."""
 import textwrap
 
-from fields.common import JSON, ListError, between, bounds, by, clang_formatted, description, entries, flow, members_text, properties, ros_lines
+from fields.common import (JSON, ListError, bounds, by, description, entries, files_of, flow, known_to_ros, members_text, properties, ros_lines,
+                           target_reader_source)
 
 LIST = "edge_app/tracking/target_fields.yaml"
 BY = by(LIST)
@@ -131,28 +132,27 @@ def message(fields):
 
 
 def ros_source(fields):
-    out = [f"// {BY}", "", '#include "alidade_ros/target_reader.h"', "", "namespace alidade_ros {", "",
-           "void read_fields(const TargetReader& read, alidade_msgs::Target* message) {"]
+    lines = []
     for field in fields:
         ros = field["ros"]
         kind = ros.get("as", READ.get(field["type"]))
         if "as" not in ros and field["type"] == "number" and {"null_if", "left_out_if", "space"} & field.keys():
             kind = "number_or_nan"
         if "has" in ros:
-            out += [f"message->{ros['has']} = read.{ros['has']}();"]
-        out += [f'message->{ros["name"]} = read.{kind}("{field["name"]}");']
-    return "\n".join(out + ["}", "", "}  // namespace alidade_ros", ""])
+            lines += [f"message->{ros['has']} = read.{ros['has']}();"]
+        lines += [f'message->{ros["name"]} = read.{kind}("{field["name"]}");']
+    return target_reader_source(BY, "TargetReader", "Target", lines)
 
 
 # ---- files
 
 def generated(files):
     fields = fields_of_list()
-    known_to_ros = [field for field in fields if field["ros"].get("as") != "none"]
-    own = {"edge_app/tracking/target_fields.h": cpp(fields), "ros_wrapper/alidade_ros/src/target_fields.cpp": ros_source(known_to_ros)}
-    own = {path: clang_formatted(path, text) for path, text in own.items()}
-    api, page, msg = "edge_app/output/openapi.yaml", "docs/target_tracking.md", "ros_wrapper/alidade_msgs/msg/Target.msg"
-    own[api] = between(api, files, f"# {BY}", "# Until here.", openapi(fields))
-    own[page] = between(page, files, f"<!-- {BY} -->", "<!-- Until here. -->", table(fields))
-    own[msg] = between(msg, files, f"# {BY}", "# Until here.", message(known_to_ros))
-    return own
+    return files_of(BY, files, {
+        "edge_app/tracking/target_fields.h": cpp(fields),
+        "ros_wrapper/alidade_ros/src/target_fields.cpp": ros_source(known_to_ros(fields)),
+    }, {
+        "edge_app/output/openapi.yaml": openapi(fields),
+        "docs/target_tracking.md": table(fields),
+        "ros_wrapper/alidade_msgs/msg/Target.msg": message(known_to_ros(fields)),
+    })
