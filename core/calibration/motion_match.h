@@ -2,11 +2,10 @@
 // Clock offset and focal length from motion alone, without a guess. Over some 0.5 s the image moves
 // by
 //   (-f cos(tilt) dpan, f dtilt).
-// The clock offset d is the shift of time at which the tracks' median motion correlates best with the telemetry's. f is the
-// ratio of the two motions there. Medians and the normalised correlation need neither a guess of f
-// nor clean tracks.
-// Small tilt and nominal axes are assumed: good to some percent, which the robust adjustment
-// removes. Allocates.
+// The clock offset d is the shift of time at which the tracks' median motion correlates best with
+// the telemetry's. f is the ratio of the two motions there. Medians and the normalised correlation
+// need neither a guess of f nor clean tracks. Small tilt and nominal axes are assumed: good to some
+// percent, which the robust adjustment removes. Allocates.
 
 #include <vector>
 

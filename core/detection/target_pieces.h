@@ -17,8 +17,8 @@
 namespace alidade {
 
 // Joins boxes of one thing up to most_size_px; the others keep their order. z: row by row, the
-// values that the boxes were made from (change_regions.h). sigma_grey: grey levels of a difference with z = 1 in an
-// even area.
+// values that the boxes were made from (change_regions.h). sigma_grey: grey levels of a difference
+// with z = 1 in an even area.
 void join_target_pieces(const SmoothedView& now, const std::int16_t* z, double sigma_grey,
                         const ChangeOptions& options, std::vector<DetectionBox>* boxes);
 

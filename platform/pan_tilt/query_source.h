@@ -3,8 +3,9 @@
 // a grid of rate_hz, or slower if the serial line cannot carry that. One query is outstanding at a
 // time; an answer later than the next grid point shifts the grid. A sample was true between the
 // sending of the query and the first byte of its answer. Protocols that report one axis at a time
-// give one sample for each reading of tilt, with pan interpolated to its moment (AxisPairing). Angles are mapped by sign
-// and zero to the model's axes, in [-pi, pi). Late answers: docs/derivations.md.
+// give one sample for each reading of tilt, with pan interpolated to its moment (AxisPairing).
+// Angles are mapped by sign and zero to the model's axes, in [-pi, pi). Late answers:
+// docs/derivations.md.
 // kDisconnected: no link, or no sample within timeout_s and three queries given up; error() says
 // what came instead. The link is then reopened after a growing pause. kFailed: an address or a
 // device that can never work. read() does the I/O on the calling thread; it allocates.

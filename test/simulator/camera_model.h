@@ -2,17 +2,20 @@
 // The virtual camera's geometry: lens, mount and read-out, written on its own from MODEL's formulas
 // and sharing no code with core/, so that the two can be checked against each other.
 //
-//   orientation  R_base_from_camera = Rot(pan_axis, pan) Rot(tilt_axis, tilt) R_frd_from_rdf (PTCEE 16)
-//   lens         lens.h, about the image's centre unless stated; with a zoom that of each moment (zoom.h); its focal length
-//                breathes by a factor of the time
-//   mast         R_world_from_camera = Exp(sway(t)) R_base_from_camera; base and world are one where nothing sways
-//   pupil        a place at distance D in direction d of where the axes meet is seen along R^T d - pupil / D
+//   orientation  R_base_from_camera = Rot(pan_axis, pan) Rot(tilt_axis, tilt) R_frd_from_rdf
+//                (PTCEE 16)
+//   lens         lens.h, about the image's centre unless stated; with a zoom that of each moment
+//                (zoom.h); its focal length breathes by a factor of the time
+//   mast         R_world_from_camera = Exp(sway(t)) R_base_from_camera; base and world are one
+//                where nothing sways
+//   pupil        a place at distance D in direction d of where the axes meet is seen along
+//                R^T d - pupil / D
 //   read-out     row coordinate v is exposed at t0 + v * line_delay, around that moment
 //
 // Base frame forward-right-down, camera frame right-down-forward; pixel coordinates are continuous,
 // the centre of the top-left pixel is (0.5, 0.5).
-// Orientation and lens are evaluated afresh at whatever time is asked for: no rate is assumed constant.
-// Thread-safe after construction; only the constructor allocates.
+// Orientation and lens are evaluated afresh at whatever time is asked for: no rate is assumed
+// constant. Thread-safe after construction; only the constructor allocates.
 
 #include <Eigen/Core>
 #include <cstddef>
@@ -50,8 +53,8 @@ class CameraModel {
     return lens_.project(d_camera);
   }
 
-  // Where a direction in the world frame appears in the frame that starts at t0; nothing if on no row.
-  // inverse_distance: 1/m, from where the axes meet; 0: infinitely far.
+  // Where a direction in the world frame appears in the frame that starts at t0; nothing if on no
+  // row. inverse_distance: 1/m, from where the axes meet; 0: infinitely far.
   [[nodiscard]] std::optional<Eigen::Vector2d> project_rolling(const Eigen::Vector3d& d_world,
                                                                double t0_s,
                                                                double inverse_distance = 0) const;

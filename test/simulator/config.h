@@ -38,7 +38,8 @@ struct Breathing {
   double period = 12;  // s
 };
 
-// One swing of the mast: the base turns against the world about an axis of its own by amplitude sin(2 pi frequency t + phase).
+// One swing of the mast: the base turns against the world about an axis of its own by amplitude
+// sin(2 pi frequency t + phase).
 struct Swing {
   enum class Axis { kForward, kRight, kDown };
   Axis axis = Axis::kRight;
@@ -159,7 +160,8 @@ struct SensorConfig {
   std::vector<Interval> covered;
 };
 
-// One part of a gear's error: what is reported is off by amplitude * sin(2 pi angle / period + phase).
+// One part of a gear's error: what is reported is off by amplitude * sin(2 pi angle / period +
+// phase).
 struct GearHarmonic {
   double amplitude = 0;           // rad
   double period = 6.28318530718;  // rad, of the true angle

@@ -1,4 +1,5 @@
-// What is in front of the virtual camera and in its pictures beyond a still, clean scene: each effect by what defines it.
+// What is in front of the virtual camera and in its pictures beyond a still, clean scene: each
+// effect by what defines it.
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>

@@ -1,12 +1,14 @@
 #pragma once
 // How far away a patch's places are, and what a pupil off the axes' crossing sees of them.
 //
-// The place that is in direction d from where the axes meet stands at distance D(d) from there. D is one number, or goes between
-// nearest and farthest as the place's own smooth noise does, by ratio; or it has so many layers. A ray p + s r (pupil p, unit
-// vector r, both in the patch's frame) meets the sphere of radius D where s D^-1 = t, t = sqrt(1 - e^2 + (e r)^2) - e r,
-// e = p / D: the direction seen is r + e / t. Smooth: D of the direction that is found, over and over until it stays (the shift must be
-// smaller than what D changes over). Layers: the nearest one that the ray meets where that layer or a nearer one is; behind a nearer one's
-// edge its own picture goes on. Thread-safe, no allocation.
+// The place that is in direction d from where the axes meet stands at distance D(d) from there. D
+// is one number, or goes between nearest and farthest as the place's own smooth noise does, by
+// ratio; or it has so many layers. A ray p + s r (pupil p, unit vector r, both in the patch's
+// frame) meets the sphere of radius D where s D^-1 = t, t = sqrt(1 - e^2 + (e r)^2) - e r,
+// e = p / D: the direction seen is r + e / t. Smooth: D of the direction that is found, over and
+// over until it stays (the shift must be smaller than what D changes over). Layers: the nearest one
+// that the ray meets where that layer or a nearer one is; behind a nearer one's edge its own
+// picture goes on. Thread-safe, no allocation.
 
 #include <Eigen/Core>
 #include <algorithm>
@@ -75,7 +77,8 @@ class DepthMap {
  private:
   static constexpr std::size_t kMostLayers = 16;
   static constexpr double kSpread = 0.8;
-  // Of part() over a length: a lattice's values are at most 2 apart, and fade() is at most 15/8 steep, along either axis.
+  // Of part() over a length: a lattice's values are at most 2 apart, and fade() is at most 15/8
+  // steep, along either axis.
   static constexpr double kSteepest = kSpread * 2 * 1.875 * 1.4143;
   static constexpr int kMostSteps = 12;
   static constexpr double kSettled = 1e-16;  // rad^2

@@ -1,11 +1,13 @@
 #pragma once
 // One lens at one moment: from directions to pixels and back.
 //
-//   u = f (x s + 2 p1 x y + p2 (r^2 + 2 x^2)) + c_u, r^2 = x^2 + y^2, s = 1 + k r^2 + k2 r^4 (PTCEE 28 with k alone;
-//   v = aspect f (y s + p1 (r^2 + 2 y^2) + 2 p2 x y) + c_v                                      Brown's with all)
+//   u =        f (x s + 2 p1 x y + p2 (r^2 + 2 x^2)) + c_u    r^2 = x^2 + y^2
+//   v = aspect f (y s + p1 (r^2 + 2 y^2) + 2 p2 x y) + c_v    s = 1 + k r^2 + k2 r^4
+// PTCEE 28 with k alone; Brown's with all.
 //
-// Pixel coordinates are continuous, the centre of the top-left pixel is (0.5, 0.5). Where r s falls again (k < 0: from
-// r^2 = 1 / (3 |k|) on) the lens folds: what lies beyond is not seen, and pixels beyond see nothing. No allocation.
+// Pixel coordinates are continuous, the centre of the top-left pixel is (0.5, 0.5). Where r s falls
+// again (k < 0: from r^2 = 1 / (3 |k|) on) the lens folds: what lies beyond is not seen, and pixels
+// beyond see nothing. No allocation.
 
 #include <Eigen/Core>
 #include <cmath>
@@ -22,7 +24,8 @@ struct Lens {
   double radial_distortion_2 = 0;
   Eigen::Vector2d tangential{Eigen::Vector2d::Zero()};  // p1, p2
 
-  // Squared slope of a ray up to which the lens maps one to one: the first root of 1 + 3 k q + 5 k2 q^2.
+  // Squared slope of a ray up to which the lens maps one to one: the first root of
+  // 1 + 3 k q + 5 k2 q^2.
   [[nodiscard]] double largest_slope_squared() const {
     const double linear = 3 * radial_distortion;
     const double square = 5 * radial_distortion_2;
@@ -76,8 +79,8 @@ struct Lens {
   }
 
  private:
-  // Undistorted over distorted radius is the root of s + q s^3 + q2 s^5 = 1, q = k times the square of the distorted one, q2 = k2
-  // times its fourth power.
+  // Undistorted over distorted radius is the root of s + q s^3 + q2 s^5 = 1, q = k times the square
+  // of the distorted one, q2 = k2 times its fourth power.
   [[nodiscard]] Eigen::Vector2d without_radial(const Eigen::Vector2d& distorted) const {
     const double square = distorted.squaredNorm();
     const double q = radial_distortion * square;

@@ -1,6 +1,7 @@
 #pragma once
-// Smooth random fields without a picture: values of a lattice of whole numbers, each from its place and the seed alone, with
-// smooth interpolation in between. About -1 to 1, zero mean; boundless; the same at any time and on any thread. No allocation.
+// Smooth random fields without a picture: values of a lattice of whole numbers, each from its place
+// and the seed alone, with smooth interpolation in between. About -1 to 1, zero mean; boundless;
+// the same at any time and on any thread. No allocation.
 
 #include <cmath>
 #include <cstdint>

@@ -41,7 +41,8 @@ class Path {
   [[nodiscard]] virtual Span moving() const { return {}; }
 };
 
-// The camera's, after the play that telemetry states. Throws ConfigError if a CSV file cannot be read; the text names file and line.
+// The camera's, after the play that telemetry states. Throws ConfigError if a CSV file cannot be
+// read; the text names file and line.
 [[nodiscard]] std::unique_ptr<Path> make_path(const Config& config);
 
 }  // namespace alidade::simulator

@@ -1,9 +1,11 @@
 #pragma once
 // What a camera does to its pictures before it sends them: temporal noise reduction and sharpening.
 //
-//   reduced_n = w reduced_(n-1) + (1 - w) new_n,   sent_n = reduced_n + a (reduced_n - Gauss(reduced_n, sigma)), rounded
+//   reduced_n = w reduced_(n-1) + (1 - w) new_n
+//   sent_n    = reduced_n + a (reduced_n - Gauss(reduced_n, sigma)), rounded
 //
-// The first picture is taken as it is. What is sharpened is not fed back. Pictures are given in their order; one thread at a time.
+// The first picture is taken as it is. What is sharpened is not fed back. Pictures are given in
+// their order; one thread at a time.
 
 #include <cstdint>
 #include <opencv2/core.hpp>

@@ -334,7 +334,8 @@ TEST(VirtualDepth, WhatIsSeenStandsWhereItsDistanceHasIt) {
       const Eigen::Vector3d from_pupil = distance * place.homogeneous().normalized() - pupil;
       const double off = from_pupil.normalized().cross(ray.normalized()).norm();
       if (off < 1e-6) ++exact;
-      // What is hidden behind an edge is seen as part of the layer behind: then it is nearer by its place.
+      // What is hidden behind an edge is seen as part of the layer behind: then it is nearer by its
+      // place.
       if (layers == 0) EXPECT_LT(off, 1e-5);
     }
     EXPECT_GT(exact, kRays * 9 / 10) << layers;

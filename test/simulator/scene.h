@@ -1,15 +1,16 @@
 #pragma once
 // The far scene around the virtual camera: patches on the sphere, the first in front.
 //
-// Order: clouds, water, moving objects, flat areas, photos, procedural patches, background. A patch is centred on a
-// direction (azimuth positive right, elevation positive up; in base, FRD:
-// (cos e cos a, cos e sin a, -sin e)), upright there, and mapped either rectilinearly (tangent plane)
-// or by longitude and latitude about its own centre. Borders are soft over one pixel.
-// Each patch is prepared at the density the camera needs (about 1.4 texels a pixel at the optical
-// axis), over the part that will be seen; under a zoom once for each doubling of the focal length, over what is seen at about
-// that one or a longer one, and what lies between two densities is made of both. Brightness: 0 black, 1 white, linear.
-// A patch with a distance is seen from the camera's pupil (depth_map.h), and the nearer patch is in front of the farther one,
-// whatever their order. shade() is thread-safe and does not allocate.
+// Order: clouds, water, moving objects, flat areas, photos, procedural patches, background. A patch
+// is centred on a direction (azimuth positive right, elevation positive up; in base, FRD: (cos e
+// cos a, cos e sin a, -sin e)), upright there, and mapped either rectilinearly (tangent plane) or
+// by longitude and latitude about its own centre. Borders are soft over one pixel. Each patch is
+// prepared at the density the camera needs (about 1.4 texels a pixel at the optical axis), over the
+// part that will be seen; under a zoom once for each doubling of the focal length, over what is
+// seen at about that one or a longer one, and what lies between two densities is made of both.
+// Brightness: 0 black, 1 white, linear. A patch with a distance is seen from the camera's pupil
+// (depth_map.h), and the nearer patch is in front of the farther one, whatever their order. shade()
+// is thread-safe and does not allocate.
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>

@@ -1,7 +1,7 @@
 #pragma once
-// Writes encoded pictures as a Matroska file through libavformat: JPEG, or H.264 or H.265 in Annex B, each access unit that
-// stands by itself with its parameter sets before it.
-// Throws std::runtime_error naming the file. One thread at a time.
+// Writes encoded pictures as a Matroska file through libavformat: JPEG, or H.264 or H.265 in Annex
+// B, each access unit that stands by itself with its parameter sets before it. Throws
+// std::runtime_error naming the file. One thread at a time.
 
 #include <cstdint>
 #include <filesystem>

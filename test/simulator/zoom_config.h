@@ -1,6 +1,7 @@
 #pragma once
-// Configuration of the zoom: how the lens answers to its reading, how well it repeats, how it is moved and what is told
-// of it. See zoom_curve.h, zoom_path.h and zoom.h for what the values do; docs/simulator.md lists the keys of the file.
+// Configuration of the zoom: how the lens answers to its reading, how well it repeats, how it is
+// moved and what is told of it. See zoom_curve.h, zoom_path.h and zoom.h for what the values do;
+// docs/simulator.md lists the keys of the file.
 
 #include <Eigen/Core>
 #include <filesystem>

@@ -104,8 +104,8 @@ class LensFollower {
   // Prior for a solution about this camera and rate (1/s).
   [[nodiscard]] ZoomPrior prior(const Camera<double>& camera, double zoom_rate) const;
 
-  // zoom, zoom_rate: as solved. focal_length: px, with the correction, at phi = 0. The result's zoom
-  // is the caller's to set.
+  // zoom, zoom_rate: as solved. focal_length: px, with the correction, at phi = 0. The result's
+  // zoom is the caller's to set.
   [[nodiscard]] OwnLens learn(double time_s, const SolvedZoom& zoom, double focal_length,
                               double zoom_rate, const LensScale& scale);
   void note_lost() { frames_lost_ += columns_ ? 1 : 0; }

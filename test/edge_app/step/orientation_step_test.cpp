@@ -1144,7 +1144,8 @@ INSTANTIATE_TEST_SUITE_P(
         FalseStamps{"OnePercentFast", [](int, double t) { return 1.01 * t; }}),
     [](const auto& one) { return one.param.name; });
 
-// d is of the delay before the step, so sigma holds the step until a calibration of the time after it.
+// d is of the delay before the step, so sigma holds the step until a calibration of the time after
+// it.
 TEST(OrientationStep, TellsAStepOfTheSendersClockWithItsSize) {
   OrientationStepOptions options = options_without_offsets();
   options.wait_for_pace = true;

@@ -1,4 +1,5 @@
-// The calibrations of a frame and of its answer, as the lens is learnt, moves and begins another map.
+// The calibrations of a frame and of its answer, as the lens is learnt, moves and begins another
+// map.
 
 #include "core/realtime/oe_mode/calibration_in_use.h"
 

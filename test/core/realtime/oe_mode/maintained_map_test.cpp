@@ -1,4 +1,5 @@
-// The map as a whole: begun, handed over, moved with the lens, forgotten where nothing is as it should be.
+// The map as a whole: begun, handed over, moved with the lens, forgotten where nothing is as it
+// should be.
 
 #include "core/realtime/oe_mode/maintained_map.h"
 
