@@ -234,7 +234,7 @@ class StatusPage(SystemTest):
             told = []
 
             def chosen():
-                self.browser.execute_script("forgetDirection('')")
+                self.browser.execute_script("forgetDirection(''); arguments[0].scrollIntoView({block: 'center'})", picture)
                 ActionChains(self.browser).move_to_element_with_offset(picture, u, v).click().perform()
                 wait_until(lambda: self.text("pointing-hint") != "", "an answer")
                 told[:] = [self.browser.execute_script("return marker?.direction")]
