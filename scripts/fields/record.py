@@ -7,7 +7,7 @@ from fields.common import (JSON, ListError, bounds, by, description, entries, fi
 
 LIST = "edge_app/record/record_fields.yaml"
 BY = by(LIST)
-KEYS = {"name", "type", "unit", "null_if", "says", "more", "value", "of", "enum", "minimum", "absent", "start", "ros", "columns", "members"}
+KEYS = {"name", "type", "unit", "null_if", "says", "more", "value", "of", "enum", "minimum", "maximum", "absent", "start", "ros", "columns", "members"}
 TYPES = {"number", "integer", "boolean", "word", "array", "object"}
 # Those of CONVENTIONS.md: a time in ms or an angle in degrees would be the only one of a record.
 UNITS = ("s", "s/row", "1/s", "px", "rad", "rad^2", "rad/s", "rad/s^2")
@@ -75,8 +75,7 @@ def schema(field):
     if field["type"] == "array":
         size = len(field["columns"])
         parts = ["type: array"] + (["nullable: true"] if may_lack(field) else []) + [f"minItems: {size}, maxItems: {size}"]
-        minimum = f", minimum: {field['minimum']}" if "minimum" in field else ""
-        parts.append(f"items: {{type: number{minimum}}}")
+        parts.append(f"items: {{{', '.join(['type: number', *bounds(field)])}}}")
     elif field["type"] == "object":
         names = [member["name"] for member in field["members"]]
         parts = ["type: object", "nullable: true", f"required: [{', '.join(names)}]"]

@@ -21,7 +21,7 @@ NOT_SHOWN = {"clock_locked", "telemetry_zero"}
 # What is generated, and what a new field brings there.
 OF_RECORDS = {
     "edge_app/record/record_fields.h": 'line->add("sun_rad", record.sun_rad);',
-    OPENAPI: "sun_rad: {type: number, nullable: true",
+    OPENAPI: "sun_rad: {type: number, nullable: true, minimum: -2, maximum: 2, ",
     "docs/records.md": "| `sun_rad` | rad | how high the Sun stands; `null`: it is night |",
     "ros_wrapper/alidade_msgs/msg/FrameOrientation.msg": "float64 sun ",
     "ros_wrapper/alidade_ros/include/alidade_ros/record_fields.h": "std::optional<double> sun_rad;",
@@ -65,6 +65,8 @@ NEW = """
 - name: sun_rad
   type: number
   unit: rad
+  minimum: -2
+  maximum: 2
   null_if: it is night
   says: how high the Sun stands
   value: record.sun_rad
