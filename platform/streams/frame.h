@@ -1,6 +1,7 @@
 #pragma once
-// Frames of any video source. Times are seconds of the host's CLOCK_MONOTONIC, taken when the frame
-// arrived, never after decoding.
+// Frames of any video source. Times are s. Those of this host are of CLOCK_MONOTONIC, and taken
+// before decoding. Which member of FrameStamp takes what a source knows: platform/video/README.md,
+// "Which stamps".
 
 #include <cstddef>
 #include <cstdint>
@@ -17,20 +18,22 @@ inline constexpr const char* kInterlaced =
 // What a frame's receive time refers to.
 enum class StampedAt : std::uint8_t {
   kArrival,        // arrival at this host; the frame may have waited on its way
-  kExposureStart,  // stamped by the driver at the start of exposure; later waiting does not matter
-  kFrameEnd        // stamped by the driver when the whole frame was read out
+  kExposureStart,  // the start of exposure, as the driver says; later waiting does not matter
+  kFrameEnd        // the end of the whole frame's readout, as the driver says; likewise
 };
 
 // When and in which order a frame came. Fixed size; crosses queues by value.
 struct FrameStamp {
   std::int64_t frame = 0;  // 0, 1, 2, ...: count of the frames that this source delivered
-  // s, host CLOCK_MONOTONIC; arrival of the frame's last packet. A source that stamps its first
-  // byte or takes the driver's stamp says so.
+  // s, host CLOCK_MONOTONIC: what stamped_at says. An arrival is that of the frame's last packet,
+  // unless the source's header says: of its first byte.
   double receive_time_s = 0;
   std::optional<double> sender_time_s;   // capture, by the sender's clock; unwrapped, any epoch
   std::optional<double> sender_utc_s;    // the same as Unix time, once RTCP or the like gives it
   std::optional<std::int64_t> sequence;  // the sender's frame count, unwrapped; a gap is a loss
   bool restarted = false;  // first after a (re)connection: sender clock and sequence start anew
+  // Of receive_time_s. Not recorded: a replay takes each for an arrival. Counts only with a
+  // sequence and without sender_time_s (frame_clock.h).
   StampedAt stamped_at = StampedAt::kArrival;
 };
 
@@ -39,8 +42,10 @@ struct Frame {
   FrameStamp stamp;
   int width = 0;   // px
   int height = 0;  // px
-  // 8-bit luma; row v starts at luma + v * stride. Null if the source was told not to decode, and
-  // while it cannot: reference data was lost and the next key frame has not come.
+  // 8-bit luma; row v starts at luma + v * stride. Its range is as the camera sends it, 0 to 255 or
+  // 16 to 235; nothing tells which. Null if the source was told not to decode (PT mode), while it
+  // cannot (reference data was lost and the next key frame has not come), and for a picture of more
+  // than max_pixels.
   const std::uint8_t* luma = nullptr;
   std::ptrdiff_t stride = 0;          // bytes
   std::shared_ptr<const void> owner;  // keeps luma alive
