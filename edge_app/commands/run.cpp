@@ -56,6 +56,12 @@ PipelineOptions pipeline_options(const Config& config, const PublishedCalibratio
   return options;
 }
 
+SceneTapOptions scene_tap_options(const SceneMapConfig& config) {
+  SceneTapOptions options;  // least_pause_s has no key
+  options.interval_s = config.interval_s;
+  return options;
+}
+
 // Null if no server is configured.
 std::unique_ptr<HttpServer> make_http(const Config& config, const HttpApiSources& sources,
                                       ImageTap* tap) {
@@ -160,8 +166,7 @@ int run_live(const RunOptions& options) {
   if (targets) of_pipeline.detectors = targets->detector_tap();
   const auto scene = load_scene(config, calibration);
   std::optional<SceneTap> scene_tap;
-  if (scene)
-    of_pipeline.scene = &scene_tap.emplace(*scene, SceneTapOptions{config.scene_map.interval_s});
+  if (scene) of_pipeline.scene = &scene_tap.emplace(*scene, scene_tap_options(config.scene_map));
   Pipeline pipeline(*video, *pan_tilt, sinks, calibrating.calibration.get(), of_pipeline);
   HttpApiSources sources;
   sources.live = &live;

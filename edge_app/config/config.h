@@ -51,7 +51,7 @@ struct CalibrationConfig {
 
 struct SceneMapConfig {
   std::string file;                // a scene.map; empty: none
-  double interval_s = 10;          // s between two localizations when nothing asks for one sooner
+  double interval_s = 10;          // s, from the end of a search to the next picture: scene_tap.h
   double zero_sigma_rad = 1e-3;    // rad, of telemetry's zero from one start to the next
   bool correct_moved_base = true;  // false: a movement is only reported
   bool update = false;             // pictures that are found in the map keep the file up to date

@@ -1,8 +1,14 @@
 #pragma once
 // SceneTap: now and then lends a live picture to the localizer, which finds where it looks by the
-// scene map. Pictures are wanted at the start, after a reconnection, when OE mode has lost its
-// landmarks or has found some, else each interval_s; without telemetry as soon as possible while
-// there is no orientation.
+// scene map. A picture is wanted:
+// 1. at the start, and after a reconnection of the video;
+// 2. when OE mode has lost its landmarks, or found some, since the last picture;
+// 3. without telemetry, while frames have no orientation;
+// 4. when the last one was not found, or a second one has to confirm it;
+// 5. else interval_s after the end of the last search.
+// In cases 1 to 4 least_pause_s lie between the end of a search and the next picture. After each
+// picture that is not found the pause doubles, five times at most; it is never longer than
+// interval_s. For a frame without orientation it stays least_pause_s.
 //
 //   real-time thread --LocalizableFrame--> localization thread --ToldBase--> real-time thread
 //                                                | ImageSlot
@@ -10,7 +16,6 @@
 //
 // One picture at a time, the newest when the thread is ready: none waits. For the real-time thread
 // this is a few atomics and one push of a fixed-size message. The image is lent with its slot.
-// Pauses grow while pictures are refused, unless the frame had no orientation.
 
 #include <array>
 #include <atomic>
@@ -52,8 +57,8 @@ class SceneLocator {
 };
 
 struct SceneTapOptions {
-  double interval_s = 10;    // s, > 0
-  double least_pause_s = 1;  // s, > 0, between two pictures
+  double interval_s = 10;    // s, > 0: of case 5
+  double least_pause_s = 1;  // s, > 0: of the others
 };
 
 class SceneTap {
