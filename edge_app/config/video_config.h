@@ -1,5 +1,5 @@
 #pragma once
-// Section `video`: where frames come from. Each type of source is one row of video_types(); the
+// Section `video`: where frames come from. Each type of source is one row of kVideoTypes; the
 // switches over VideoConfig::Type have no default, so that the compiler names what a new type
 // lacks. To add one: platform/video/README.md.
 
