@@ -3,9 +3,9 @@
 // A frame may have waited for an unknown time before it arrived and was stamped: behind a relay or
 // a network that stood still, in a cache, or in the socket of this process. Its time comes from the
 // sender's clock, else from the sequence numbers, else from arrivals alone (receipt_clock.h,
-// uneven_arrivals.h). A driver's stamps (stamped_at) count beside sequence numbers only: frames
-// whose count leaves them keep them. Time stamps that run at a wrong rate, or count pictures, are
-// left out.
+// uneven_arrivals.h). A driver's stamps (stamped_at) count beside sequence numbers only: a frame
+// that the numbers put elsewhere keeps its stamp. Time stamps that run at a wrong rate, or count
+// pictures, are left out.
 // wait_for_pace false (receive times that are not arrivals, or a recording read as a source):
 // CaptureClock alone. Derivation: docs/derivations.md.
 // Seconds. Fixed memory, no allocation, one thread.
