@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include "core/calibration/landmark_elimination.h"
@@ -42,6 +43,23 @@ bool solve_iteratively(const Linearisation& in, double damping, Eigen::VectorXd*
 }
 
 }  // namespace
+
+bool ReducedFactor::set(Eigen::MatrixXd S) {
+  scale_ = S.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  L_ = scale_.asDiagonal() * S * scale_.asDiagonal();
+  const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>, Eigen::Lower> llt(L_);
+  return llt.info() == Eigen::Success;
+}
+
+Eigen::MatrixXd ReducedFactor::half_solve(const Eigen::MatrixXd& B) const {
+  return L_.triangularView<Eigen::Lower>().solve(scale_.asDiagonal() * B);
+}
+
+bool Adjustment::factorise(const Linearisation& in, ReducedFactor* factor) {
+  const bool regular = reduce(in, 0) && factor->set(std::move(reduced_));
+  forget_reduced();
+  return regular;
+}
 
 bool Adjustment::reduce(const Linearisation& in, double damping) {
   in.H.copy_to(&reduced_);

@@ -10,11 +10,25 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <functional>
 #include <vector>
 
 #include "core/calibration/linearisation.h"
 
 namespace alidade::internal {
+
+// Cholesky of S, the normal matrix with the landmarks eliminated.
+class ReducedFactor {
+ public:
+  // S: its lower triangle. False if it is not positive definite.
+  [[nodiscard]] bool set(Eigen::MatrixXd S);
+  // K B with K^T K = S^-1.
+  [[nodiscard]] Eigen::MatrixXd half_solve(const Eigen::MatrixXd& B) const;
+
+ private:
+  Eigen::VectorXd scale_;  // to a unit diagonal
+  Eigen::MatrixXd L_;
+};
 
 class Adjustment {
  public:
@@ -51,6 +65,20 @@ class Adjustment {
                                                   const Linearisation& linearisation) const {
     return lineariser_.influences(state, linearisation, global_rows_);
   }
+
+  // Of all that is in use, see Lineariser.
+  void visit(const AdjustmentState& state, const Linearisation& linearisation,
+             const std::function<void(const ObservationRow&)>& observation,
+             const std::function<void(const TelemetryRow&)>& telemetry) const {
+    lineariser_.visit(state, linearisation, observation, telemetry);
+  }
+
+  // Takes as long as a step of Levenberg-Marquardt by Cholesky, at any size.
+  [[nodiscard]] bool factorise(const Linearisation& linearisation, ReducedFactor* factor);
+
+  // The parameters' rows of H^-1, of the latest covariance(); zero where fixed.
+  [[nodiscard]] const GlobalRows& global_rows() const { return global_rows_; }
+  [[nodiscard]] const std::array<bool, kGlobalCount>& fixed() const { return fixed_; }
 
   [[nodiscard]] int steps_taken() const { return steps_taken_; }
 

@@ -184,6 +184,14 @@ struct TelemetryResidual {
   bool outlier = false;
 };
 
+// Parts of the recording disagree in a parameter beyond chance. Its sigma has grown to what they
+// show.
+struct CalibrationContradiction {
+  std::string parameter;
+  std::string between;  // which parts: "stretches of time"
+  double scatter = 1;   // of the parts' values, where 1 is what their noise makes it
+};
+
 struct CalibrationQuality {
   double pixel_sigma_ratio = 0;      // residual / stated noise, redundancy accounted for
   double telemetry_sigma_ratio = 0;  // likewise
@@ -204,6 +212,7 @@ struct CalibrationQuality {
   // Clock offset or read-out time is among what is too uncertain. Changes of speed would help.
   bool weak_in_time = false;
   std::vector<std::string> advice;  // what motion or knowledge would help; also with kOk
+  std::optional<CalibrationContradiction> contradiction;  // the worst
 };
 
 struct CalibrationResult {

@@ -49,10 +49,11 @@ struct ObservationModel {
     CameraJacobian J_camera;
   };
 
-  // Error and derivatives in units of sigma.
+  // Error and derivatives in units of sigma. row: if not null, its last four members too.
   [[nodiscard]] bool evaluate(const AdjustmentObservation& observation,
                               const PanTilt<double>& angle, const PanTilt<double>& rate,
-                              const Landmark& landmark, Result* out) const {
+                              const Landmark& landmark, Result* out,
+                              ObservationRow* row = nullptr) const {
     Matrix<double, 3, 2> J_xi_angle;
     Matrix<double, 3, 4> J_xi_axes;
     const Matrix3<double> R = R_base_from_camera(mechanics, angle, &J_xi_angle, &J_xi_axes);
@@ -85,9 +86,27 @@ struct ObservationModel {
     J.col(index(Parameter::kLineDelay)) = J_u_time * (observation.u.y() / camera.height);
     J.rightCols<4>() = J_u_xi * J_xi_axes + J_u_db * landmark.J_db_axes;
     out->J_camera = whiten * J;
+    if (row != nullptr) {
+      row->whiten = whiten;
+      row->d_c = d_c;
+      row->J_u_dc = J_u_dc;
+      row->u_rate = J_u_time;
+    }
     return true;
   }
 };
+
+// Of a sample in units of sigma, by pan scale, tilt scale, shift, drift.
+Eigen::Matrix<double, 2, 4> telemetry_jacobian(const AdjustmentTelemetry& sample,
+                                               const Vector2<double>& scale,
+                                               const Vector2<double>& angle,
+                                               const Vector2<double>& rate,
+                                               double since_reference) {
+  Eigen::Matrix<double, 2, 4> J;
+  J << angle[0], 0, -scale[0] * rate[0], scale[0] * rate[0] * since_reference,  //
+      0, angle[1], -scale[1] * rate[1], scale[1] * rate[1] * since_reference;
+  return sample.sigma.cwiseInverse().asDiagonal() * J;
+}
 
 struct RobustCost {
   double cost;
@@ -292,6 +311,50 @@ std::vector<Influence> Lineariser::influences(const AdjustmentState& state, cons
   return all;
 }
 
+void Lineariser::visit(const AdjustmentState& state, const Linearisation& at,
+                       const std::function<void(const ObservationRow&)>& observation,
+                       const std::function<void(const TelemetryRow&)>& telemetry) const {
+  const ObservationModel model(state);
+  const TrajectorySpline& trajectory = state.trajectory;
+  for (std::size_t i = 0; i < data_.observations.size(); ++i) {
+    const AdjustmentObservation& o = data_.observations[i];
+    if (!o.used) continue;
+    ObservationRow row;
+    row.time_s = at.observations[i].time_s;
+    row.basis = trajectory.basis(row.time_s, at.observations[i].segment);
+    ObservationModel::Result result;
+    if (!model.evaluate(o, trajectory.position(row.basis), trajectory.rate(row.basis),
+                        model.turn(state.landmarks[static_cast<std::size_t>(o.landmark)]), &result,
+                        &row)) {
+      continue;
+    }
+    row.index = i;
+    row.landmark = o.landmark;
+    row.error = result.error;
+    row.J_angle = result.J_angle;
+    row.J_landmark = result.J_landmark;
+    row.J_camera = result.J_camera;
+    observation(row);
+  }
+  const Vector2<double> scale(state.mechanics.pan_scale, state.mechanics.tilt_scale);
+  for (std::size_t i = 0; i < data_.telemetry.size(); ++i) {
+    const AdjustmentTelemetry& sample = data_.telemetry[i];
+    if (!sample.used) continue;
+    TelemetryRow row;
+    row.index = i;
+    row.time_s = at.telemetry[i].time_s;
+    row.basis = trajectory.basis(row.time_s, at.telemetry[i].segment);
+    row.error = at.telemetry[i].error;
+    row.slope = scale.cwiseQuotient(sample.sigma);
+    row.J =
+        telemetry_jacobian(sample, scale, trajectory.position(row.basis).vector(),
+                           trajectory.rate(row.basis).vector(), sample.time_s - data_.reference_s);
+    row.sigma = sample.sigma;
+    row.is_noise = sample.is_noise;
+    telemetry(row);
+  }
+}
+
 void Lineariser::add_telemetry(const AdjustmentState& state, const LossScales& loss,
                                Linearisation* out) {
   const TrajectorySpline& trajectory = state.trajectory;
@@ -320,11 +383,8 @@ void Lineariser::add_telemetry(const AdjustmentState& state, const LossScales& l
     if (!sample.used) continue;
     out->cost += robust.cost;
 
-    // Columns pan scale, tilt scale, shift, drift.
-    Eigen::Matrix<double, 2, 4> J;
-    J << angle[0], 0, -scale[0] * rate[0], scale[0] * rate[0] * since_reference,  //
-        0, angle[1], -scale[1] * rate[1], scale[1] * rate[1] * since_reference;
-    J = (sample.sigma.cwiseInverse().asDiagonal() * J).eval();
+    const Eigen::Matrix<double, 2, 4> J =
+        telemetry_jacobian(sample, scale, angle, rate, since_reference);
     const Matrix2<double> J_squared =
         robust.weight * Matrix2<double>(slope.cwiseAbs2().asDiagonal());
     add_control_points(basis, J_squared, &H);

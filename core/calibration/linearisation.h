@@ -11,6 +11,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstddef>
+#include <functional>
 #include <limits>
 #include <vector>
 
@@ -122,6 +123,35 @@ using GlobalRows = Eigen::Matrix<double, kGlobalCount, Eigen::Dynamic>;
 // Change of the parameters with the error of one observation, in units of its sigma.
 using Influence = Eigen::Matrix<double, kGlobalCount, 2>;
 
+// An observation in use at a state, with what departures from the model act on
+// (departure_score.h). Derivatives are of the projection, in units of sigma.
+struct ObservationRow {
+  std::size_t index = 0;
+  int landmark = 0;
+  double time_s = 0;
+  TrajectorySpline::Basis basis;
+  Vector2<double> error;
+  Matrix2<double> J_angle;
+  Matrix2<double> J_landmark;
+  Eigen::Matrix<double, 2, kObservedCount> J_camera;
+  Matrix2<double> whiten;  // A^-1 / sigma: from a displacement in px to units of sigma
+  Vector3<double> d_c;
+  Matrix<double, 2, 3> J_u_dc;  // px
+  Vector2<double> u_rate;       // px/s, of the landmark's image
+};
+
+// A telemetry sample in use, likewise.
+struct TelemetryRow {
+  std::size_t index = 0;
+  double time_s = 0;
+  TrajectorySpline::Basis basis;
+  Vector2<double> error;
+  Vector2<double> slope;           // derivative by (pan, tilt), of either axis
+  Eigen::Matrix<double, 2, 4> J;   // by pan scale, tilt scale, shift, drift
+  Vector2<double> sigma;           // rad
+  std::array<bool, 2> is_noise{};  // as in AdjustmentTelemetry
+};
+
 void apply_step(const Eigen::VectorXd& x, const std::vector<Vector2<double>>& x_landmark,
                 AdjustmentState* state);
 
@@ -140,6 +170,12 @@ class Lineariser {
   [[nodiscard]] std::vector<Influence> influences(const AdjustmentState& state,
                                                   const Linearisation& at,
                                                   const GlobalRows& inverse) const;
+
+  // Calls either function for each observation and each sample in use. at: least squares at this
+  // state.
+  void visit(const AdjustmentState& state, const Linearisation& at,
+             const std::function<void(const ObservationRow&)>& observation,
+             const std::function<void(const TelemetryRow&)>& telemetry) const;
 
  private:
   void add_observations(const AdjustmentState& state, const LossScales& loss, Linearisation* out);

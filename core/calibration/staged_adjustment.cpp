@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/calibration/contradictions.h"
 #include "core/calibration/knot_choice.h"
 #include "core/calibration/noise_check.h"
 #include "core/calibration/rounded_telemetry.h"
@@ -20,6 +21,9 @@ namespace {
 const double kOutlierSquaredError = 2 * std::log(1e4);
 // Cauchy scale (sigmas) of the robust adjustment.
 constexpr double kRobustScale = 3;
+// Rows of the normal equations. Beyond, some three minutes, parts are not compared: it takes too
+// long.
+constexpr Eigen::Index kLargestChecked = 2000;
 
 double median_error(const std::vector<LinearisedResidual>& residuals) {
   std::vector<double> errors;
@@ -75,6 +79,7 @@ StageStatus StagedAdjustment::adjust_on_inliers(CalibrationQuality* quality) {
   StageStatus status = allow_for_repetition(quality);
   if (!status.ok()) return status;
   allow_for_shared_errors();
+  allow_for_contradictions(quality);
   return {};
 }
 
@@ -179,6 +184,30 @@ void StagedAdjustment::allow_for_shared_errors() {
       influences,
       shared_error_growth(selected_->data, adjusted_.at, influences, adjusted_.covariance),
       adjusted_.covariance);
+}
+
+void StagedAdjustment::allow_for_contradictions(CalibrationQuality* quality) {
+  ReducedFactor factor;
+  if (adjusted_.at.H.rows() > kLargestChecked || !adjustment_.factorise(adjusted_.at, &factor)) {
+    return;
+  }
+  const auto& times = selected_->data.frame_time_s;
+  const ContradictionCheck check =
+      check_contradictions(usual_divisions(adjusted_.state.trajectory, times.front(), times.back()),
+                           adjustment_, adjusted_.state, adjusted_.at, factor);
+  const auto first_global = adjusted_.at.H.rows() - kGlobalCount;
+  // What landmarks and frames have in common is part of what parts show.
+  GlobalVector root = GlobalVector::Ones();
+  for (int p = 0; p < kGlobalCount; ++p) {
+    const double white = adjustment_.global_rows()(p, first_global + p);
+    const double variance = adjusted_.covariance(p, p);
+    if (variance > 0) root[p] = std::sqrt(std::max(1.0, check.growth[p] * white / variance));
+  }
+  adjusted_.covariance = (root.asDiagonal() * adjusted_.covariance * root.asDiagonal()).eval();
+  if (check.worst.parameter < 0) return;
+  const int p = check.worst.parameter;
+  quality->contradiction = {p == kDrift ? "clock_drift" : to_string(static_cast<Parameter>(p)),
+                            check.worst.between, check.worst.scatter};
 }
 
 }  // namespace alidade::internal

@@ -32,8 +32,9 @@ class StagedAdjustment {
 
   // Least squares on the rest, with outliers marked again. Noise levels that the residuals
   // contradict beyond chance are replaced by the residuals' (noise_check.h). The covariance grows
-  // where residuals move the parameters together (shared_errors.h). A robust loss on good data
-  // would inflate the sigmas. Sets the quality's steps, ratios and repetition.
+  // where residuals move the parameters together (shared_errors.h), and where parts of the
+  // recording contradict each other (contradictions.h). A robust loss on good data would inflate
+  // the sigmas. Sets the quality's steps, ratios, repetition and contradiction.
   [[nodiscard]] StageStatus adjust_on_inliers(CalibrationQuality* quality);
 
   [[nodiscard]] const Adjusted& adjusted() const { return adjusted_; }
@@ -47,6 +48,7 @@ class StagedAdjustment {
   bool correct_noise(CalibrationQuality* quality);
   [[nodiscard]] StageStatus allow_for_repetition(CalibrationQuality* quality);
   void allow_for_shared_errors();
+  void allow_for_contradictions(CalibrationQuality* quality);
 
   SelectedInput* selected_;
   TelemetryAngleNoise noise_;

@@ -1,0 +1,60 @@
+#pragma once
+// Whether parts of a recording contradict each other, and by how much the sigmas must grow then.
+// Parts: blocks of time, cells of an axis's angle, runs between an axis's reversals; each long
+// against what errors of neighbouring frames have in common. Whatever the model leaves out and the
+// trajectory does not absorb moves the parameters part by part:
+//   z_c = sum of F_i e_i over the rows of part c        F_i influence, of observations and telemetry
+//   growth of parameter p = sum_c z_c,p^2 / sum_c V_c,pp   V_c: variance of z_c if errors are white
+// Nothing grows unless that is beyond chance. Derivation: docs/calibration.md. Allocates.
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "core/calibration/adjustment.h"
+
+namespace alidade::internal {
+
+// A way of dividing a recording. Parts are 0 to parts - 1.
+struct Division {
+  std::string name;  // "stretches of time"
+  int parts = 0;
+  std::function<int(double time_s)> part_at;  // image clock
+};
+
+// What one division says of one parameter.
+struct PartGrowth {
+  double ratio = 1;    // of variances, of the share that the data decide
+  double freedom = 0;  // independent parts behind it; 0: none
+  double share = 0;    // of the variance, that rows in parts decide
+};
+
+// How the parts disagree most improbably. scatter: of the parts' values, 1 where they agree.
+struct Contradiction {
+  int parameter = -1;  // as in GlobalVector; -1: nothing is beyond chance
+  std::string between;
+  double scatter = 1;
+};
+
+struct ContradictionCheck {
+  GlobalVector growth = GlobalVector::Ones();  // of each parameter's variance, at least 1
+  Contradiction worst;
+};
+
+// Over the time from which frames come.
+[[nodiscard]] std::vector<Division> usual_divisions(const TrajectorySpline& trajectory,
+                                                    double begin_s, double end_s);
+
+// Of each division, of each parameter.
+[[nodiscard]] std::vector<std::vector<PartGrowth>> part_growth(
+    const std::vector<Division>& divisions, const Adjustment& adjustment,
+    const AdjustmentState& state, const Linearisation& at, const ReducedFactor& factor);
+
+// The largest growth that any division shows beyond chance, at 1 % for all of them together.
+[[nodiscard]] ContradictionCheck check_contradictions(const std::vector<Division>& divisions,
+                                                      const Adjustment& adjustment,
+                                                      const AdjustmentState& state,
+                                                      const Linearisation& at,
+                                                      const ReducedFactor& factor);
+
+}  // namespace alidade::internal
