@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
+#include <cmath>
 #include <string>
 
 #include "platform/system/clock.h"
@@ -78,6 +80,28 @@ void RecordLog::log_clock(const OutputMessage& message) {
       video_.name(), 1e3 * events.video_delay_wander_s, *message.record.frame);
 }
 
+void RecordLog::log_delay(const OutputMessage& message) {
+  const StepEvents& events = message.events;
+  if (!events.link_delay_s) return;
+  const double delay_ms = 1e3 * *events.link_delay_s;
+  const double sigma_ms = 1e3 * events.link_delay_sigma_s;
+  constexpr double kAlike = 3;     // standard deviations
+  constexpr double kAlike_ms = 5;  // by which connections differ anyway
+  if (std::abs(delay_ms) < std::max(kAlike_ms, kAlike * sigma_ms)) {
+    spdlog::info(
+        "{}: motion shows at frame {} that it comes as late against the pictures as when the "
+        "camera was calibrated ({:+.1f} +- {:.1f} ms)",
+        pan_tilt_.name(), *message.record.frame, delay_ms, sigma_ms);
+    return;
+  }
+  spdlog::warn(
+      "{}: it now comes {:.1f} +- {:.1f} ms {} against the pictures than when the camera was "
+      "calibrated, as motion shows at frame {}: another codec, a relay, other firmware? From here "
+      "on it is looked up accordingly",
+      pan_tilt_.name(), std::abs(delay_ms), sigma_ms, delay_ms > 0 ? "later" : "earlier",
+      *message.record.frame);
+}
+
 void RecordLog::log_repeated(const OrientationRecord& record) {
   if (record.status != RecordStatus::kImageRepeated || !repeated_.is_due()) return;
   spdlog::warn(
@@ -98,6 +122,7 @@ void RecordLog::add(const OutputMessage& message, const DropCounters& drops) {
   log_repeated(message.record);
   log_old_telemetry(message.record);
   log_clock(message);
+  log_delay(message);
   log_drops(drops);
 }
 

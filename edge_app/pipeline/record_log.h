@@ -1,6 +1,6 @@
 #pragma once
 // RecordLog: logs what is remarkable about records and about what comes with them: telemetry too
-// old, clocks, repeated images, full queues. What may come with every record is logged rarely. For
+// old, clocks, the delay of the links, repeated images, full queues. What may come with every record is logged rarely. For
 // the output thread.
 
 #include "edge_app/pipeline/realtime_stage.h"
@@ -32,6 +32,7 @@ class RecordLog {
 
   void log_old_telemetry(const OrientationRecord& record);
   void log_clock(const OutputMessage& message);
+  void log_delay(const OutputMessage& message);
   void log_repeated(const OrientationRecord& record);
   void log_drops(const DropCounters& drops);
 

@@ -37,10 +37,13 @@ OrientationStep::OrientationStep(const OrientationStepOptions& options)
                   options.telemetry_limits, options.wait_for_pace}),
       zoom_(options.zoom_tolerance),
       lens_(options.oe ? options.oe->lens.belief : ReadingBeliefOptions()),
-      // A stored calibration was made over another connection.
-      minimum_delay_sigma_s_(
-          options.other_connection && options.calibrated ? options.minimum_delay_sigma_s : 0),
+      unseen_delay_sigma_s_(options.unseen_delay_sigma_s),
+      link_delay_(std::hypot(options.telemetry_noise.pan_tilt_sigma,
+                             options.telemetry_noise.resolution / std::sqrt(12.0)),
+                  options.minimum_delay_sigma_s),
       scene_lens_(options.calibration) {
+  // A stored calibration was made over another connection.
+  if (options.other_connection && options.calibrated) link_delay_.open(unseen_delay_sigma_s_);
   if (!options.oe) return;
   OeOptions oe = *options.oe;
   oe.max_width = options.calibration.camera.width;
@@ -55,37 +58,17 @@ OrientationStep::OrientationStep(const OrientationStepOptions& options)
   start_up_ = std::make_unique<StartUpTracker>(start_up);
 }
 
-namespace {
-
-// A delay error, or a clock that wanders, is the same in many frames, so more frames do not average
-// it out. A time error t changes the rate by a t, with the acceleration a, and the angle in second
-// order by a t^2 / 2.
-void allow_for_lasting_error(double sigma_s, InterpolatedPanTilt* measured) {
-  if (!(sigma_s > 0)) return;
-  const double square = sigma_s * sigma_s;
-  const std::array<double, 2> rate = {measured->rate.pan, measured->rate.tilt};
-  double share = 0;
-  for (int axis = 0; axis < 2; ++axis) {
-    const double of_rate = rate[static_cast<std::size_t>(axis)];
-    double& variance = measured->covariance(axis, axis);
-    const double lasting = square * of_rate * of_rate;
-    if (lasting > 0) share = std::max(share, std::min(1.0, lasting / variance));
-    variance += measured->acceleration_square[axis] * square * square / 4;
-    measured->covariance(2 + axis, 2 + axis) += measured->acceleration_square[axis] * square;
-  }
-  measured->correlation_time_s =
-      std::max(measured->correlation_time_s, share * DelayWander::kMemory_s);
-}
-
-}  // namespace
-
 void OrientationStep::add_telemetry(const PanTiltSample& sample) {
   const TelemetryIntake::Taken taken = telemetry_.add(sample);
-  if (taken.restarted && oe_) oe_->forget_pending();
+  if (taken.restarted) {
+    link_delay_.break_images();
+    if (oe_) oe_->forget_pending();
+  }
   const bool has_zoom = sample.zoom && std::isfinite(*sample.zoom);
   if (has_zoom && zoom_.take(sample.latest_time_s, *sample.zoom)) note_curve_here();
   if (!taken.time_s) return;
   if (has_zoom) zoom_.place(*taken.time_s);
+  link_delay_.add(TelemetrySample{*taken.time_s, 0, sample.pan_rad, sample.tilt_rad});
   settle_pending_frames();
 }
 
@@ -95,8 +78,7 @@ void OrientationStep::settle_pending_frames() {
   TelemetryLookUp look_up;
   while (oe_->pending(*newest_s, &look_up)) {
     InterpolatedPanTilt late;
-    const QueryStatus query = telemetry_.query(look_up.time_s, look_up.time_sigma_s, &late);
-    allow_for_lasting_error(lasting_sigma_s_, &late);
+    const QueryStatus query = ask_telemetry(look_up.time_s, look_up.time_sigma_s, &late);
     oe_->settle_pending(query == QueryStatus::kOk ? &late : nullptr);
   }
 }
@@ -124,16 +106,22 @@ bool OrientationStep::keeps_map(const PublishedCalibration& published) const {
 
 void OrientationStep::adopt(const PublishedCalibration& published) {
   const bool keep = keeps_map(published);
+  // A withdrawn calibration's clock offset stays in use.
+  if (!published.of_this_connection) {
+    if (now_.calibrated) {
+      link_delay_.change_calibration(published.calibration.clock_offset -
+                                     now_.calibration.clock_offset);
+    } else {
+      link_delay_.open(unseen_delay_sigma_s_);
+    }
+  } else if (published.calibrated) {
+    link_delay_.begin_calibrated();
+  }
+  has_shown_ = false;
   now_.calibration = published.calibration;
   now_.calibrated = published.calibrated;
   now_.zoom_curve = published.zoom_curve;
   zoom_.note_adoption();
-  // A withdrawn calibration's clock offset stays in use.
-  if (!published.of_this_connection) {
-    minimum_delay_sigma_s_ = std::max(minimum_delay_sigma_s_, connections_sigma_s_);
-  } else if (published.calibrated) {
-    minimum_delay_sigma_s_ = 0;
-  }
   note_curve_here();
   if (oe_ && !keep) oe_->reset(published.calibration, published.map, focal_length());
 }
@@ -163,8 +151,13 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
   events->video_delay_wander_s = frame_time.wander_s;
   events->stamps_left_out = frame_time.stamp_rate_error;
   events->stamps_count = frame_time.stamps_count;
-  if (clock.restarted || clock.delay_stepped)
-    minimum_delay_sigma_s_ = std::hypot(connections_sigma_s_, frame_time.moved_s);
+  tracks_.delay_stepped = clock.delay_stepped;
+  if (clock.restarted || clock.delay_stepped) {
+    const double moved_s = std::hypot(connections_sigma_s_, frame_time.moved_s);
+    const bool is_new = stamp.restarted && now_.calibrated;
+    link_delay_.open(is_new ? std::max(unseen_delay_sigma_s_, moved_s) : moved_s);
+  }
+  tell_delay(events);
   answered_by_oe_ = false;
   image_ = image;
   tracks_.stamp = stamp;
@@ -173,7 +166,6 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
   tracks_.time_s = clock.time_s;
   tracks_.time_is_of_use = frame_time.of_use;
   tracks_.clock_restarted = clock.restarted;
-  tracks_.delay_stepped = clock.delay_stepped;
   tracks_.delay_wander_s = frame_time.wander_s;
   tracks_.telemetry_too_old = false;
   tracks_.tracker = FrameTracks::Tracker::kNone;
@@ -191,11 +183,12 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
   const Calibration& calibration = now_.calibration;
   const double to_middle_row_s = calibration.line_delay * (0.5 * calibration.camera.height);
   InterpolatedPanTilt measured;
-  const double telemetry_time_s = clock.time_s + calibration.clock_offset + to_middle_row_s;
+  by_calibration_s_ = clock.time_s + calibration.clock_offset + to_middle_row_s;
+  const double telemetry_time_s = by_calibration_s_ + link_delay_.delay_s();
   lens_.begin_frame(telemetry_time_s);
-  lasting_sigma_s_ = std::hypot(minimum_delay_sigma_s_, frame_time.off_line_s);
-  double time_sigma_s = std::hypot(clock.sigma_s, minimum_delay_sigma_s_);
-  QueryStatus query = telemetry_.query(telemetry_time_s, time_sigma_s, &measured);
+  lasting_sigma_s_ = frame_time.off_line_s;
+  double time_sigma_s = clock.sigma_s;
+  QueryStatus query = ask_telemetry(telemetry_time_s, time_sigma_s, &measured);
   if (repeated_images_.judge(image, clock.time_s, has_result(query) ? &measured : nullptr,
                              calibration.camera.focal_length)) {
     record.time_s.reset();
@@ -205,18 +198,16 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
   }
   if (repeated_images_.sigma_s() > 0) {
     time_sigma_s = std::hypot(time_sigma_s, repeated_images_.sigma_s());
-    query = telemetry_.query(telemetry_time_s, time_sigma_s, &measured);
+    query = ask_telemetry(telemetry_time_s, time_sigma_s, &measured);
   }
+  record.time_sigma_s = std::hypot(time_sigma_s, link_delay_.sigma_s());
   if (!has_telemetry_) {
-    record.time_sigma_s = time_sigma_s;
     record.clock_locked = clock.state == ClockState::kLocked;
     orient_by_scene(image, &record);
     return record;
   }
-  allow_for_lasting_error(lasting_sigma_s_, &measured);
   if (const auto newest_s = telemetry_.newest_time())
     record.telemetry_age_s = telemetry_time_s - *newest_s;
-  record.time_sigma_s = time_sigma_s;
   record.clock_locked = clock.state == ClockState::kLocked;
   record.status = status_of_telemetry(query, telemetry_.is_lost(), record.clock_locked);
   tracks_.telemetry_too_old = record.status == RecordStatus::kTelemetryTooOld;
@@ -305,6 +296,7 @@ void OrientationStep::orient(const InterpolatedPanTilt* measured, const ImageVie
 }
 
 void OrientationStep::maintain() {
+  show_motion();
   if (finds_landmarks()) {
     oe_->maintain();
     if (image_.valid()) tracks_.tracker = FrameTracks::Tracker::kOe;

@@ -18,6 +18,7 @@
 #include "core/realtime/oe_mode/oe_mode.h"
 #include "core/realtime/pt_mode.h"
 #include "core/realtime/start_up/start_up_tracker.h"
+#include "core/realtime/telemetry/link_delay.h"
 #include "edge_app/clocks/frame_clock.h"
 #include "edge_app/record/orientation_record.h"
 #include "edge_app/record/published_calibration.h"
@@ -59,8 +60,10 @@ struct OrientationStepOptions {
   // Device units: readings no further apart are one zoom. Empty: found from their jitter.
   std::optional<double> zoom_tolerance;
   ZoomCurve zoom_curve;  // for other zooms; may be empty
-  // s, one standard deviation: how much the least delays of two connections differ.
+  // s, one standard deviation: how much the delays of two connections usually differ.
   double minimum_delay_sigma_s = 5e-3;
+  // s, the same for a connection whose delay nobody has seen yet: see link_delay.h.
+  double unseen_delay_sigma_s = LinkDelay::kOpenSigma_s;
 };
 
 // Options of OE mode for a camera's images: small images get as many landmarks as large ones,
@@ -81,6 +84,10 @@ struct StepEvents {
   // the pictures come: their rate less one.
   std::optional<double> stamps_left_out;
   bool stamps_count = false;  // those stamps count pictures
+  // From this frame on telemetry is looked up by so much later than the calibration says, s, as
+  // motion has shown; and one standard deviation.
+  std::optional<double> link_delay_s;
+  double link_delay_sigma_s = 0;
 };
 
 class OrientationStep {
@@ -156,6 +163,14 @@ class OrientationStep {
   // Passes telemetry to OE mode for frames that were answered by extrapolation, once samples
   // enclose them.
   void settle_pending_frames();
+  // Telemetry's answer with what the delay of the link adds to its covariance.
+  [[nodiscard]] QueryStatus ask_telemetry(double time_s, double time_sigma_s,
+                                          InterpolatedPanTilt* out) const;
+  // What the frame added last shows of the head's motion, for the delay of the link.
+  void show_motion();
+  void show(const ImageAngles& image);
+  // Passes on that motion has told the delay of the link.
+  void tell_delay(StepEvents* events);
   // Completes a record that has its time and telemetry's status. measured: null if there is none.
   // lens: the frame's, if it may differ from the calibration's; else null.
   void orient(const InterpolatedPanTilt* measured, const ImageView& image, const FrameLens* lens,
@@ -190,10 +205,18 @@ class OrientationStep {
   std::unique_ptr<StartUpTracker> start_up_;  // null: nobody needs its points
   ZoomReadings zoom_;
   ReadLens lens_;
-  bool zoom_on_curve_ = false;        // the present zoom lies on the zoom curve
-  bool begins_here_ = false;          // and the curve is sharp enough there for a map to begin
-  double minimum_delay_sigma_s_ = 0;  // of the calibration in use, against this connection
-  // s: the part of a frame's time error that neighbouring frames share.
+  bool zoom_on_curve_ = false;  // the present zoom lies on the zoom curve
+  bool begins_here_ = false;    // and the curve is sharp enough there for a map to begin
+  double unseen_delay_sigma_s_;
+  LinkDelay link_delay_;
+  int delays_told_ = 0;          // of link_delay_, in events
+  bool delay_was_open_ = false;  // at the frame before
+  double by_calibration_s_ = 0;  // s, telemetry clock but for link_delay_, of the frame added last
+  std::uint32_t shown_map_ = 0;  // OE mode's map by which images show angles
+  ImageAngles shown_;            // by the last image that showed them
+  bool has_shown_ = false;
+  Vector2<double> mean_rate_ = Vector2<double>::Zero();  // rad/s, of shown_, over a while
+  // s: the part of a frame's time error that neighbouring frames share, but for link_delay_.
   double lasting_sigma_s_ = 0;
   RepeatedImages repeated_images_;
   SceneStart scene_start_;        // without telemetry

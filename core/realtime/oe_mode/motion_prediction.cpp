@@ -3,6 +3,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/realtime/frame_orientation.h"
 
@@ -104,6 +105,12 @@ double MotionPrediction::since_last_s(double frame_time_s) const {
 
 FrameMotion<double> MotionPrediction::last_carried_on(double frame_time_s) const {
   return alidade::carried_on(last_motion_, frame_time_s - last_time_s_);
+}
+
+double MotionPrediction::carried_on_sigma(double frame_time_s) const {
+  if (!follows(frame_time_s)) return std::numeric_limits<double>::infinity();
+  const double t = since_last_s(frame_time_s);
+  return acceleration_sigma_ * t * t / 2;
 }
 
 void MotionPrediction::move(double change, const ParameterDirection& direction) {

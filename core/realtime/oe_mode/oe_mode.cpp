@@ -7,6 +7,8 @@
 namespace alidade {
 namespace {
 
+constexpr double kMuchMore = 3;
+
 // 1/s; sigma of the zoom rate of the frame's own lens, from its noise and that of phi.
 double rate_sigma(const SolvedMotion& solved) {
   const SolvedZoom& zoom = solved.zoom;
@@ -70,14 +72,21 @@ OeStatus OeMode::process(const ImageView& image, double frame_time_s,
                                      offset_.inflation(*telemetry, frame_time_s))
           : prediction_.by_last_frame(frame_time_s);
   predicted.motion.zoom_rate = own_lens() != nullptr ? calibration_.lens().expected().value[1] : 0;
-  const double sigma_px =
+  double sigma_px =
       camera().focal_length * std::sqrt(predicted.angle_covariance.diagonal().maxCoeff());
   offset_.drift(prediction_.since_last_s(frame_time_s));
   tie_.drift(prediction_.since_last_s(frame_time_s));
 
-  // 2. Coarse alignment.
-  const LandmarkSearch::Coarse coarse =
-      search_.align_coarse(searched(), predicted.motion, sigma_px);
+  // 2. Coarse alignment. Where telemetry leaves much open, as with a link whose delay is not known,
+  // the previous frame tells better where to begin.
+  FrameMotion<double> from = predicted.motion;
+  const double carried_px = camera().focal_length * prediction_.carried_on_sigma(frame_time_s);
+  if (telemetry != nullptr && sigma_px > kMuchMore * carried_px) {
+    from = prediction_.last_carried_on(frame_time_s);
+    from.zoom_rate = predicted.motion.zoom_rate;
+    sigma_px = carried_px;
+  }
+  const LandmarkSearch::Coarse coarse = search_.align_coarse(searched(), from, sigma_px);
   statistics_.coarse_shift_px = coarse.shift_px;
 
   // 3. and 4. Landmarks, and the solution.
@@ -281,6 +290,9 @@ OeStatus OeMode::answer_with_landmarks(const PredictedMotion& predicted, const S
   statistics_.map_offset = {offset.value.x(), offset.value.y()};
   statistics_.map_offset_covariance = offset.covariance;
   statistics_.inliers = solved.inliers;
+  statistics_.angle = motion.angle;
+  statistics_.rate = motion.rate;
+  statistics_.map = maps_;
   frame_.use = MapUse::kHeld;
   return finish(OeStatus::kOk);
 }

@@ -48,7 +48,12 @@ struct OeStatistics {
   int found = 0;               // by patch alignment
   int inliers = 0;             // in agreement with the solution
   double coarse_shift_px = 0;  // px at the image's centre, correction by coarse alignment
-  PanTilt<double> map_offset;  // rad, base minus map
+  // With kOk, at the middle row: what landmarks and telemetry show in the map's frame. Frames with
+  // the same `map` share that frame.
+  PanTilt<double> angle;                                            // rad, true, not wrapped
+  PanTilt<double> rate;                                             // rad/s, true
+  std::uint32_t map = 0;                                            // count of the maps so far
+  PanTilt<double> map_offset;                                       // rad, base minus map
   Matrix2<double> map_offset_covariance = Matrix2<double>::Zero();  // rad^2
   // own_lens: the frame's lens was solved for, as it had moved since the map began. reading_sigmas:
   // |log f minus the zoom reading's| in standard deviations of both.
@@ -225,6 +230,7 @@ class OeMode {
   CalibrationInUse calibration_;
   bool ready_ = false;        // images of the calibration's size fit
   std::uint32_t frames_ = 0;  // count
+  std::uint32_t maps_ = 0;    // count
 
   ImageOctaves image_;  // of the last frame used
   MaintainedMap map_;

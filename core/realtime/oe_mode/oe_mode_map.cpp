@@ -35,6 +35,7 @@ MapState OeMode::map_state() const {
 }
 
 void OeMode::forget_map() {
+  ++maps_;
   tie_.map_is_lost(offset_.offset());
   const bool elsewhere = calibration_.begin_map();
   const Calibration& calibration = calibration_.of_frame();

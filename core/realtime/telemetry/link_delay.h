@@ -1,0 +1,148 @@
+#pragma once
+// LinkDelay: by how much telemetry comes later, against the pictures, than a calibration says.
+//   telemetry(t + delay) = image(t) + constant
+// image(t): the mount's angles as the images show them, from any zero; t holds the calibration's
+// clock offset. Each sample is compared with them at every delay of a grid. The sums of squares
+// give the delay and its sigma once the mount has accelerated, then follow it. What is found must
+// explain two stretches of motion in a row before it replaces a delay that was believed.
+// Measured units, rad; s. Fixed memory, no allocation. One thread. Derivation: docs/clocks.md.
+
+#include <array>
+#include <cstddef>
+#include <type_traits>
+
+#include "core/model/angle.h"
+#include "core/realtime/telemetry/telemetry_buffer.h"
+
+namespace alidade {
+
+// The mount's angles as one image shows them.
+struct ImageAngles {
+  double time_s = 0;      // s, telemetry clock by the calibration's offset
+  PanTilt<double> angle;  // rad, measured units, from any zero, not wrapped
+  PanTilt<double> rate;   // rad/s
+};
+
+enum class LinkDelayState {
+  kCalibrated,  // the calibration's offset is this connection's
+  kOpen,        // another connection: nothing has told the delay yet
+  kFound        // motion has told it
+};
+
+class LinkDelay {
+ public:
+  static constexpr double kRange_s = 0.5;       // either way
+  static constexpr double kOpenSigma_s = 0.15;  // an even share of 0 to 0.5 s
+
+  // angle_sigma: rad, of the white noise of a sample, > 0. connections_sigma_s: by how much the
+  // delays of two connections usually differ.
+  LinkDelay(double angle_sigma, double connections_sigma_s);
+
+  // The calibration's clock offset was found through this connection.
+  void begin_calibrated();
+  // The connection is another one. sigma_s: of its delay, as long as motion has not told it.
+  void open(double sigma_s = kOpenSigma_s);
+  // Another calibration is used, whose clock offset is larger by by_s and was found through yet
+  // another connection. What is known of this connection's delay stays.
+  void change_calibration(double by_s);
+  // The next image has nothing to do with those before.
+  void break_images();
+
+  void add(const TelemetrySample& sample);
+  void add(const ImageAngles& image);
+
+  [[nodiscard]] LinkDelayState state() const { return state_; }
+  // s, to be added to the calibration's clock offset, and its standard deviation.
+  [[nodiscard]] double delay_s() const { return delay_s_; }
+  [[nodiscard]] double sigma_s() const { return sigma_s_; }
+  // Count of the delays that motion has told: 1 with the first, and 1 more with each that replaces
+  // it.
+  [[nodiscard]] int found() const { return found_; }
+
+ private:
+  static constexpr int kCandidates = 201;
+  static constexpr int kCentre = kCandidates / 2;
+  static constexpr double kStep_s = 2 * kRange_s / (kCandidates - 1);
+  static constexpr std::size_t kImages = 256;
+  static constexpr std::size_t kSamples = 256;
+
+  // Of the residuals of one axis, at each candidate.
+  struct Sums {
+    std::array<double, kCandidates> squares{};  // about the mean of each stretch
+    std::array<double, kCandidates> lagged{};   // products of neighbours, likewise
+    double degrees = 0;                         // of freedom
+    double square_rate = 0;                     // (rad/s)^2, sum over the samples
+    double samples = 0;
+  };
+  // The stretch of motion that is being summed.
+  struct Stretch {
+    std::array<double, kCandidates> first{};  // sum
+    std::array<double, kCandidates> squares{};
+    std::array<double, kCandidates> lagged{};
+    std::array<double, kCandidates> before{};  // residual of the sample before
+    double reference = 0;                      // rad, near all residuals
+    double square_rate = 0;
+    int samples = 0;
+  };
+  using BothAxes = std::array<Sums, 2>;
+  struct Told {
+    bool sure = false;
+    double delay_s = 0;
+    double sigma_s = 0;
+    double improbable = 0;  // -log of the present delay's likelihood against this one's
+  };
+  template <class T, std::size_t kCapacity>
+  class Ring {
+   public:
+    void push(const T& item) {
+      items_[(first_ + size_) % kCapacity] = item;
+      if (size_ < kCapacity) {
+        ++size_;
+      } else {
+        first_ = (first_ + 1) % kCapacity;
+      }
+    }
+    void pop() {
+      first_ = (first_ + 1) % kCapacity;
+      --size_;
+    }
+    void clear() { size_ = 0; }
+    [[nodiscard]] std::size_t size() const { return size_; }
+    [[nodiscard]] const T& operator[](std::size_t i) const {
+      return items_[(first_ + i) % kCapacity];
+    }
+
+   private:
+    std::array<T, kCapacity> items_{};
+    std::size_t first_ = 0;
+    std::size_t size_ = 0;
+  };
+
+  void forget();
+  void compare(const TelemetrySample& sample);
+  void close_stretch();
+  static void add_stretch(const Stretch& stretch, Sums* sums);
+  [[nodiscard]] BothAxes with_stretch() const;
+  [[nodiscard]] Told judge(const BothAxes& sums) const;
+  void take(const Told& told);
+
+  double angle_sigma_;
+  double connections_sigma_s_;
+  LinkDelayState state_ = LinkDelayState::kCalibrated;
+  double delay_s_ = 0;
+  double sigma_s_ = 0;
+  int found_ = 0;
+  Ring<ImageAngles, kImages> images_;
+  Ring<TelemetrySample, kSamples> samples_;
+  TelemetrySample last_;  // of the samples
+  bool has_last_ = false;
+  std::array<Stretch, 2> stretch_;
+  double stretch_since_s_ = 0;
+  BothAxes sums_;          // of the stretches before, fading
+  BothAxes last_against_;  // the stretch before, if it contradicts the present delay
+  bool is_contradicted_ = false;
+};
+
+static_assert(std::is_trivially_copyable_v<LinkDelay>);
+
+}  // namespace alidade
