@@ -16,6 +16,7 @@
 #include "core/calibration/calibration_types.h"
 #include "core/model/calibration.h"
 #include "core/model/lens/zoom_curve.h"
+#include "core/model/telemetry_error.h"
 
 namespace alidade {
 
@@ -26,6 +27,7 @@ struct CalibrationNotes {
   std::vector<std::pair<std::string, CalibrationPrior>> priors;  // the ones used, by parameter
   std::string landmarks;                                         // side file's name; empty: none
   ZoomCurve zoom_curve;                                          // empty: none
+  TelemetryError telemetry_error;                                // none by default
 };
 
 // Reads a text such as
@@ -37,14 +39,16 @@ struct CalibrationNotes {
 //   zoom: 1234                                      optional
 //   covariance: {names: [...], matrix: [[...]]}     optional; must agree with the sigmas
 //   zoom_curve: {...}                               optional: other readings, zoom_text.h
+//   pan_error, pan_play_rad ...: {...}              optional: telemetry_error_text.h
 //   quality: {...}                                  optional: residuals, counts, priors, advice
 //   landmarks: map.bin                              optional: file beside this one
 // Without centre_offset the covariance does not name the centre either. False and one line in
-// *error; name stands for the file in it. curve, if not null: the zoom curve, empty if there is
+// *error; name stands for the file in it. curve, telemetry_error, if not null: empty if there is
 // none.
 [[nodiscard]] bool parse_calibration(const std::string& text, const std::string& name,
                                      Calibration* calibration, std::string* error,
-                                     ZoomCurve* curve = nullptr);
+                                     ZoomCurve* curve = nullptr,
+                                     TelemetryError* telemetry_error = nullptr);
 // The parameters that a file names: all, except an optical centre that is exactly the image's
 // middle.
 [[nodiscard]] std::vector<Parameter> parameters_of(const Calibration& calibration);

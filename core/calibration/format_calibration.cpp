@@ -6,6 +6,7 @@
 
 #include "core/calibration/calibration_text.h"
 #include "core/calibration/number_text.h"
+#include "core/calibration/telemetry_error_text.h"
 #include "core/calibration/zoom_text.h"
 
 namespace alidade {
@@ -112,6 +113,7 @@ std::string format_calibration(const Calibration& calibration, const Calibration
   write_scalar(Parameter::kClockOffset, calibration.clock_offset,
                "s; telemetry clock = image clock + clock_offset");
   if (calibration.zoom) out << YAML::Key << "zoom" << YAML::Value << exact_text(*calibration.zoom);
+  internal::write_telemetry_error(notes.telemetry_error, &out);
   if (!cov.isZero(0)) {
     out << YAML::Key << "covariance" << YAML::Value << YAML::BeginMap << YAML::Key << "names"
         << YAML::Value << YAML::Flow << YAML::BeginSeq;

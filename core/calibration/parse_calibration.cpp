@@ -7,6 +7,7 @@
 #include "core/calibration/estimate_reader.h"
 #include "core/calibration/number_text.h"
 #include "core/calibration/strict_yaml.h"
+#include "core/calibration/telemetry_error_text.h"
 #include "core/calibration/zoom_text.h"
 
 namespace alidade {
@@ -68,9 +69,11 @@ class CalibrationReader {
   Calibration read() {
     file_.check_top(
         "a calibration",
-        {"format", "image", "focal_length", "aspect", "radial_distortion", "centre_offset",
-         "zoom_curve", "line_delay", "pan_axis", "tilt_axis", "pan_scale", "tilt_scale",
-         "clock_offset", "zoom", "covariance", "quality", "landmarks"});
+        {"format",        "image",        "focal_length",  "aspect",     "radial_distortion",
+         "centre_offset", "zoom_curve",   "line_delay",    "pan_axis",   "tilt_axis",
+         "pan_scale",     "tilt_scale",   "clock_offset",  "zoom",       "pan_error",
+         "tilt_error",    "pan_play_rad", "tilt_play_rad", "covariance", "quality",
+         "landmarks"});
     const YAML::Node& root = file_.root();
     file_.read_image(&calibration_.camera.width, &calibration_.camera.height);
 
@@ -92,6 +95,7 @@ class CalibrationReader {
     calibration_.mechanics.tilt_scale = scalar(Parameter::kTiltScale);
     calibration_.clock_offset = scalar(Parameter::kClockOffset);
     if (root["zoom"]) calibration_.zoom = file_.number(root["zoom"], "zoom");
+    telemetry_error_ = internal::read_telemetry_error(file_);
     if (root["quality"] && !root["quality"].IsMap()) {
       file_.fail(root["quality"], "quality is not a map; write `quality: {name: value, ...}`");
     }
@@ -108,6 +112,7 @@ class CalibrationReader {
     return calibration_;
   }
   [[nodiscard]] const ZoomCurve& curve() const { return curve_; }
+  [[nodiscard]] const TelemetryError& telemetry_error() const { return telemetry_error_; }
 
  private:
   void set_sigma(const YAML::Node& node, const std::string& name, double sigma,
@@ -194,19 +199,21 @@ class CalibrationReader {
   const EstimateReader file_;
   Calibration calibration_;
   ZoomCurve curve_;
+  TelemetryError telemetry_error_;
   std::vector<Sigma> sigmas_;
 };
 
 }  // namespace
 
 bool parse_calibration(const std::string& text, const std::string& name, Calibration* calibration,
-                       std::string* error, ZoomCurve* curve) {
+                       std::string* error, ZoomCurve* curve, TelemetryError* telemetry_error) {
   return read_yaml(
       text, name, {"", "; valid YAML is needed"},
       [&](const YAML::Node& root) {
         CalibrationReader reader(root, name);
         *calibration = reader.read();
         if (curve != nullptr) *curve = reader.curve();
+        if (telemetry_error != nullptr) *telemetry_error = reader.telemetry_error();
       },
       error);
 }

@@ -50,7 +50,8 @@ VideoConfig require_video_config(const std::string& path) {
 PublishedCalibration require_calibration_file(const std::string& path) {
   PublishedCalibration chosen;
   std::string error;
-  if (!load_calibration(path, &chosen.calibration, &error, &chosen.zoom_curve))
+  if (!load_calibration(path, &chosen.calibration, &error, &chosen.zoom_curve,
+                        &chosen.telemetry_error))
     throw CommandError(kExitUsage, error);
   chosen.calibrated = true;
   chosen.name = path;

@@ -143,6 +143,7 @@ std::optional<PublishedCalibration> calibration_at(const StartingCalibration& st
     const StoredCalibration* stored = store->find(zoom);
     if (stored == nullptr) return std::nullopt;
     there.calibration = stored->calibration;
+    there.telemetry_error = stored->notes.telemetry_error;
     there.name = stored->path;
     return there;
   }

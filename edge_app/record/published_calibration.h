@@ -8,16 +8,18 @@
 
 #include "core/model/calibration.h"
 #include "core/model/lens/zoom_curve.h"
+#include "core/model/telemetry_error.h"
 #include "core/realtime/oe_mode/map_state.h"
 
 namespace alidade {
 
 struct PublishedCalibration {
   Calibration calibration;
-  bool calibrated = false;  // false: data-sheet values; landmarks are not looked for
-  MapState map;             // may be empty
-  std::string name;         // for people: a file, "data sheet", "live"
-  ZoomCurve zoom_curve;     // for other zooms, and while the zoom moves; may be empty
+  bool calibrated = false;         // false: data-sheet values; landmarks are not looked for
+  MapState map;                    // may be empty
+  std::string name;                // for people: a file, "data sheet", "live"
+  ZoomCurve zoom_curve;            // for other zooms, and while the zoom moves; may be empty
+  TelemetryError telemetry_error;  // of the head, at any zoom; may be empty
   // Its clock offset was found through the present connection. False: perhaps through another one,
   // whose least delay may differ.
   bool of_this_connection = true;

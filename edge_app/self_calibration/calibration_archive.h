@@ -13,7 +13,7 @@ namespace alidade {
 
 struct StoredCalibration {
   Calibration calibration;
-  CalibrationNotes notes;  // written, never read back
+  CalibrationNotes notes;  // written; of them only telemetry_error is read back
   MapState map;
   std::string path;  // of the file; empty: not stored yet
 };

@@ -42,6 +42,7 @@ SelfCalibration::SelfCalibration(const SelfCalibrationOptions& options, Calibrat
   const StoredCalibration* stored = archive != nullptr ? archive->find(std::nullopt) : nullptr;
   if (stored != nullptr) {
     first->calibration = stored->calibration;
+    first->telemetry_error = stored->notes.telemetry_error;
     first->calibrated = true;
     first->map = kept_map(stored->map);
     first->name = stored->path;

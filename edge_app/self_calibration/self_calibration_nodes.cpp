@@ -118,6 +118,9 @@ void SelfCalibration::look_for_stored() {
     return;
   }
   if (publication_.is_rejected(*found->calibration.zoom)) return;
+  found->telemetry_error = stored != nullptr && stored->notes.telemetry_error.exists()
+                               ? stored->notes.telemetry_error
+                               : publication_.object()->telemetry_error;
   found->calibrated = true;
   found->zoom_curve = nodes_.curve();
   // For a stored one the connection is unknown.

@@ -8,9 +8,10 @@
 namespace alidade {
 
 bool parse_stored_calibration(const std::string& text, const std::string& path,
-                              Calibration* calibration, std::string* error, ZoomCurve* curve) {
+                              Calibration* calibration, std::string* error, ZoomCurve* curve,
+                              TelemetryError* telemetry_error) {
   Calibration read;
-  if (!parse_calibration(text, path, &read, error, curve)) return false;
+  if (!parse_calibration(text, path, &read, error, curve, telemetry_error)) return false;
   const Camera<double>& camera = read.camera;
   if (std::max(camera.width, camera.height) > kMostPictureSide) {
     *error = path + ": for pictures of " + std::to_string(camera.width) + "x" +
@@ -23,10 +24,10 @@ bool parse_stored_calibration(const std::string& text, const std::string& path,
 }
 
 bool load_calibration(const std::string& path, Calibration* calibration, std::string* error,
-                      ZoomCurve* curve) {
+                      ZoomCurve* curve, TelemetryError* telemetry_error) {
   std::string text;
   return read_file(path, &text, error) &&
-         parse_stored_calibration(text, path, calibration, error, curve);
+         parse_stored_calibration(text, path, calibration, error, curve, telemetry_error);
 }
 
 bool save_calibration(const std::string& path, const Calibration& calibration, std::string* error) {

@@ -8,16 +8,18 @@
 
 namespace alidade {
 
-// False: one line in *error: `path: cannot be read: why`, or what is wrong in which line. curve (if
-// not null): gets the file's zoom curve; empty if there is none.
+// False: one line in *error: `path: cannot be read: why`, or what is wrong in which line. curve,
+// telemetry_error (if not null): get the file's; empty if there is none.
 [[nodiscard]] bool load_calibration(const std::string& path, Calibration* calibration,
-                                    std::string* error, ZoomCurve* curve = nullptr);
+                                    std::string* error, ZoomCurve* curve = nullptr,
+                                    TelemetryError* telemetry_error = nullptr);
 
 // Parses the text of such a file. Also refuses images larger than any picture accepted here. path:
 // named in errors.
 [[nodiscard]] bool parse_stored_calibration(const std::string& text, const std::string& path,
                                             Calibration* calibration, std::string* error,
-                                            ZoomCurve* curve = nullptr);
+                                            ZoomCurve* curve = nullptr,
+                                            TelemetryError* telemetry_error = nullptr);
 
 // Atomic: a reader, or a power cut, finds the old file or the new one, never half of one. Refuses a
 // calibration that load_calibration() would refuse.

@@ -209,7 +209,8 @@ void CalibrationStore::load_file(const std::string& path, int width, int height,
   std::string error;
   ZoomCurve curve;
   if (!read_file(path, &text, &error) ||
-      !parse_stored_calibration(text, path, &stored.calibration, &error, &curve)) {
+      !parse_stored_calibration(text, path, &stored.calibration, &error, &curve,
+                                &stored.notes.telemetry_error)) {
     lines->push_back(fmt::format("{}; {}", error, set_file_aside(path)));
     return;
   }

@@ -26,17 +26,23 @@ void require_same(const Calibration& a, const Calibration& b) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace alidade;
   Calibration calibration;
+  CalibrationNotes notes;
   std::string error;
-  if (!parse_calibration(std::string(text_of(data, size)), "calibration.yaml", &calibration,
-                         &error)) {
+  if (!parse_calibration(std::string(text_of(data, size)), "calibration.yaml", &calibration, &error,
+                         nullptr, &notes.telemetry_error)) {
     FUZZ_REQUIRE(is_one_line(error));
     FUZZ_REQUIRE(error.rfind("calibration.yaml:", 0) == 0);
     return 0;
   }
   FUZZ_REQUIRE(std::isfinite(calibration.camera.focal_length));
   FUZZ_REQUIRE(calibration.covariance.allFinite());
+  FUZZ_REQUIRE(notes.telemetry_error.pan.validate() && notes.telemetry_error.tilt.validate());
   Calibration again;
-  FUZZ_REQUIRE(parse_calibration(format_calibration(calibration), "again", &again, &error));
+  CalibrationNotes notes_again;
+  const std::string text = format_calibration(calibration, notes);
+  FUZZ_REQUIRE(
+      parse_calibration(text, "again", &again, &error, nullptr, &notes_again.telemetry_error));
   require_same(calibration, again);
+  FUZZ_REQUIRE(format_calibration(again, notes_again) == text);
   return 0;
 }

@@ -198,6 +198,93 @@ TEST(CalibrationText, RoundTripIsExactForAnyNumber) {
   EXPECT_EQ(checked, 200);
 }
 
+TelemetryError some_telemetry_error() {
+  TelemetryError error;
+  error.pan.first_rad = -0.7 / 3;
+  error.pan.spacing_rad = 0.1 / 3;
+  error.pan.count = 15;
+  for (std::size_t i = 0; i < 15; ++i) {
+    error.pan.values[i] = 1e-4 * std::sin(static_cast<double>(i)) / 3;
+    error.pan.sigmas[i] = 1e-5 / (1.0 + static_cast<double>(i));
+  }
+  error.pan.length_rad = 1.0 / 7;
+  error.pan.unseen_sigma_rad = 2e-4 / 3;
+  error.tilt.unseen_sigma_rad = 1e-4 / 3;
+  error.pan_play = {4e-4 / 3, 1e-5 / 3, PlayKind::kMotor};
+  error.tilt_play = {5e-4 / 3, 2e-5 / 3, PlayKind::kOutput};
+  return error;
+}
+
+TEST(CalibrationText, RoundTripsWhatTelemetryIsOffByToTheBit) {
+  const TelemetryError written = some_telemetry_error();
+  CalibrationNotes notes;
+  notes.telemetry_error = written;
+  Calibration calibration;
+  TelemetryError read;
+  std::string error;
+  ASSERT_TRUE(parse_calibration(format_calibration(paper_calibration(), notes), "test.yaml",
+                                &calibration, &error, nullptr, &read))
+      << error;
+  expect_same_bits(calibration, paper_calibration());
+  for (const auto& [a, b] : {std::pair(&read.pan, &written.pan), {&read.tilt, &written.tilt}}) {
+    EXPECT_EQ(a->first_rad, b->first_rad);
+    EXPECT_EQ(a->spacing_rad, b->spacing_rad);
+    EXPECT_EQ(a->count, b->count);
+    EXPECT_EQ(a->values, b->values);
+    EXPECT_EQ(a->sigmas, b->sigmas);
+    EXPECT_EQ(a->length_rad, b->length_rad);
+    EXPECT_EQ(a->unseen_sigma_rad, b->unseen_sigma_rad);
+  }
+  for (const auto& [a, b] :
+       {std::pair(&read.pan_play, &written.pan_play), {&read.tilt_play, &written.tilt_play}}) {
+    EXPECT_EQ(a->width_rad, b->width_rad);
+    EXPECT_EQ(a->sigma_rad, b->sigma_rad);
+    EXPECT_EQ(a->kind, b->kind);
+  }
+}
+
+// Files of before have nothing of it, and nothing is written where there is nothing.
+TEST(CalibrationText, HasNoErrorOfTelemetryUnlessItIsGiven) {
+  Calibration calibration;
+  TelemetryError read = some_telemetry_error();
+  std::string error;
+  ASSERT_TRUE(parse_calibration(kByHand, "test.yaml", &calibration, &error, nullptr, &read));
+  EXPECT_FALSE(read.exists());
+  EXPECT_THAT(format_calibration(paper_calibration()), Not(HasSubstr("_error")));
+  EXPECT_THAT(format_calibration(paper_calibration()), Not(HasSubstr("_play")));
+}
+
+TEST(CalibrationText, RefusesAnErrorOfTelemetryThatIsNone) {
+  const auto refused = [](const std::string& line) {
+    return refusal(std::string(kByHand) + line + "\n");
+  };
+  const std::string knots = "pan_error: {unseen_sigma_rad: 1e-4, length_rad: 0.1, ";
+  EXPECT_THAT(refused("pan_error: 3"), HasSubstr("pan_error is not a map"));
+  EXPECT_THAT(refused("pan_error: {}"), HasSubstr("pan_error.unseen_sigma_rad is missing"));
+  EXPECT_THAT(refused("tilt_error: {unseen_sigma_rad: -1}"), HasSubstr("is -1; 0 or more"));
+  EXPECT_THAT(refused("tilt_error: {unseen_sigma_rad: 1, knot: 1}"), HasSubstr("unknown key"));
+  EXPECT_THAT(refused(knots + "values_rad: [1e-4]}"), HasSubstr("pan_error.knots_rad is missing"));
+  EXPECT_THAT(refused(knots + "knots_rad: [1], values_rad: [1e-4]}"),
+              HasSubstr("pan_error.knots_rad is not a map"));
+  EXPECT_THAT(refused(knots + "knots_rad: {first: 0, spacing: 0.1}, values_rad: []}"),
+              HasSubstr("is not a list of 1 to 128 numbers"));
+  EXPECT_THAT(refused(knots + "knots_rad: {first: 0, spacing: 0.1}, values_rad: [0, 1e-4], "
+                              "sigma_rad: [1e-5]}"),
+              HasSubstr("pan_error.sigma_rad is not a list of 2 numbers"));
+  EXPECT_THAT(refused(knots + "knots_rad: {first: 0, spacing: 0.1}, values_rad: [0, .nan], "
+                              "sigma_rad: [1e-5, 1e-5]}"),
+              HasSubstr("finite number"));
+  EXPECT_THAT(refused(knots + "knots_rad: {first: 0, spacing: 0.1}, values_rad: [0, 0.03], "
+                              "sigma_rad: [1e-5, 1e-5]}"),
+              HasSubstr("pan_error: "));
+  EXPECT_THAT(refused("pan_play_rad: {value: 3e-4, sigma: 1e-5}"), HasSubstr("kind is missing"));
+  EXPECT_THAT(refused("pan_play_rad: {value: 3e-4, sigma: 1e-5, kind: gear}"),
+              HasSubstr("motor or output"));
+  EXPECT_THAT(refused("pan_play_rad: {value: 0.3, sigma: 1e-5, kind: motor}"),
+              HasSubstr("give radians"));
+  EXPECT_THAT(refused("tilt_play_rad: [1]"), HasSubstr("tilt_play_rad is not a map"));
+}
+
 TEST(CalibrationText, WritesNumbersAsAPersonWould) {
   const std::string text = format_calibration(parsed(kByHand));
   EXPECT_THAT(text, HasSubstr("radial_distortion: {value: 55.4, sigma: 0.11}"));
