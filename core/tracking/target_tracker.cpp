@@ -55,6 +55,7 @@ bool TargetTrackerOptions::validate(const char** error) const {
   }
   if (!positive(lose_after_s)) problem = "lose_after_s must be positive";
   if (!positive(forget_after_s)) problem = "forget_after_s must be positive";
+  if (forget_after_s < lose_after_s) problem = "forget_after_s must be at least lose_after_s";
   if (!positive(most_sigma)) problem = "most_sigma must be positive";
   if (!(std::isfinite(most_ahead_s) && most_ahead_s >= 0)) {
     problem = "most_ahead_s must not be negative";

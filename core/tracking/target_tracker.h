@@ -28,7 +28,7 @@ struct TargetTrackerOptions {
   int birth_hits = 3;          // sightings that confirm a target
   int birth_looks = 5;         // the first looks, among which they must be
   double lose_after_s = 1;     // time in view without being seen
-  double forget_after_s = 60;  // since last seen
+  double forget_after_s = 60;  // since last seen, in view or not; at least lose_after_s
   double most_sigma = 30;      // m or rad, of the place along its worst direction
   double most_ahead_s = 0.5;   // limit of a frame's time after now
   double history_s = 2;        // limit of a late frame's delay

@@ -87,6 +87,13 @@ TrackingConfig read_tracking(YamlSection section, bool is_there, const std::stri
       section.number("lose_after_s", {0.01, 600, "s"}).value_or(tracker.lose_after_s);
   tracker.forget_after_s =
       section.number("forget_after_s", {0.01, 86400, "s"}).value_or(tracker.forget_after_s);
+  if (tracker.forget_after_s < tracker.lose_after_s) {
+    section.fail(
+        section.has("forget_after_s") ? "forget_after_s" : "lose_after_s",
+        fmt::format("forgets after {:g} s, but loses after {:g} s; expected lose_after_s no "
+                    "more than forget_after_s",
+                    tracker.forget_after_s, tracker.lose_after_s));
+  }
   // At most 9 s, as records are kept for 10 s.
   tracker.history_s = section.number("history_s", {0, 9, "s"}).value_or(tracker.history_s);
   tracker.history_frames =

@@ -52,9 +52,10 @@ struct OrientationRecord {
   std::optional<double> zoom;
   // s: how far the frame's middle row, looked up at time_s + clock offset, lies beyond the newest
   // trusted angle of telemetry. max_extrapolation_s limits it. Negative: samples enclose the frame.
-  // Empty without a sample.
+  // Empty without a sample, and where time_s is.
   std::optional<double> telemetry_age_s;
-  // The frame that tied the record to the scene map's base. Empty: the base is telemetry's.
+  // The frame that tied the record to the scene map's base. Empty: the base is telemetry's, or there
+  // is no orientation.
   struct Localized {
     double age_s = 0;      // of that frame
     double sigma_rad = 0;  // that the tie adds to a direction: root mean square of pan and tilt
@@ -62,7 +63,7 @@ struct OrientationRecord {
     PanTilt<double> telemetry_zero;
   };
   std::optional<Localized> localized;
-  std::optional<double> latency_s;  // s, record made minus receive time; empty in a replay
+  std::optional<double> latency_s;  // s, record made minus receive time; empty with recordings
 };
 static_assert(std::is_trivially_copyable_v<OrientationRecord>);
 

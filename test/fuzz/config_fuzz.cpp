@@ -36,6 +36,7 @@ void require_sound(const Config& config) {
   FUZZ_REQUIRE(is_within(config.camera.line_delay_s, -1e-3, 1e-3));
   FUZZ_REQUIRE(is_within(config.realtime.priority, 0, 99));
   FUZZ_REQUIRE(is_within(config.realtime.cpu, -1, 1023));
+  FUZZ_REQUIRE(!config.tracking.targets || config.tracking.targets->validate());
   FUZZ_REQUIRE(!config.calibration.file.empty() || config.camera.focal_length_px);
 }
 

@@ -423,6 +423,11 @@ TEST(TargetTrackerOptions, AreChecked) {
   options.birth_looks = 2;
   EXPECT_FALSE(options.validate());
   options = {};
+  options.forget_after_s = options.lose_after_s;
+  EXPECT_TRUE(options.validate());
+  options.forget_after_s = options.lose_after_s / 2;
+  EXPECT_FALSE(options.validate());
+  options = {};
   options.acceleration_density = std::numeric_limits<double>::quiet_NaN();
   EXPECT_FALSE(options.validate());
 }
