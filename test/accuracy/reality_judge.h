@@ -1,0 +1,133 @@
+#pragma once
+// What alidade_reality measures with: a calibration and the records of a replay against the virtual camera's truth. Reads the
+// program's files on its own, so that any version of it can be judged.
+//
+// Calibration: e = truth - estimate of the kJudged parameters and their covariance C; e' C^-1 e / 8.
+// Frame: where the picture's middle looks, at the frame's time (row 0): e = truth - estimate along the picture's u and v,
+// their covariance C from that of the orientation; e' C^-1 e / 2 is "error^2 / sigma^2" here.
+// Conventions of the truth:
+//   focal length    where it breathes: its mean over the film
+//   clock offset    of the earliest stamps (docs/simulator.md): play, steps and noise reduction leave it as it is
+//   base            where the telemetry's zero is if its gear had no error: an estimator that cannot know that says so in its
+//                   sigmas. `relative` errors have one common rotation of the base taken out
+//   optical centre  an estimate that has none has its camera frame through the middle of the picture: the truth is then told
+//                   in that camera frame and in the base that belongs to it
+//   mast            directions are the world's
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "test/accuracy/statistics.h"
+#include "test/simulator/camera_model.h"
+
+namespace alidade::test {
+
+// By the names of calibration.yaml's covariance. Axes: rad, in the tangent basis of the estimate (PTCEE 9).
+inline constexpr std::array<const char*, 8> kJudged = {
+    "focal_length", "radial_distortion", "line_delay",  "pan_axis_0",
+    "pan_axis_1",   "tilt_axis_0",       "tilt_axis_1", "clock_offset"};
+inline constexpr int kJudgedCount = static_cast<int>(kJudged.size());
+using JudgedVector = Eigen::Matrix<double, kJudgedCount, 1>;
+using JudgedMatrix = Eigen::Matrix<double, kJudgedCount, kJudgedCount>;
+
+// calibration.yaml, of what is judged.
+struct FoundCalibration {
+  double focal_length = 0, radial_distortion = 0, line_delay = 0, clock_offset = 0;
+  double aspect = 1;
+  Eigen::Vector3d pan_axis, tilt_axis;
+  Eigen::Vector2d centre_offset{Eigen::Vector2d::Zero()};  // px
+  bool centre_estimated = false;
+  JudgedMatrix covariance = JudgedMatrix::Zero();
+};
+// Throws std::runtime_error.
+[[nodiscard]] FoundCalibration read_found_calibration(const std::filesystem::path& file);
+
+struct FoundOrientation {
+  int frame = -1;
+  bool oe = false;
+  Eigen::Matrix3d R_base_from_camera;
+  Eigen::Matrix3d covariance;  // rad^2, of R Exp(xi)
+};
+// A line of `alidade replay --json`; nothing in mode none. Throws std::runtime_error.
+[[nodiscard]] std::optional<FoundOrientation> read_found_orientation(const std::string& line);
+
+struct FrameError {
+  bool oe = false;
+  Eigen::Vector2d px;                              // truth - estimate, along u and v
+  Eigen::Matrix2d covariance;                      // px^2
+  Eigen::Matrix<double, 2, 3> J_rotation;          // of px, with a rotation of the base; px/rad
+  [[nodiscard]] double normalised_square() const;  // e' C^-1 e / 2
+  [[nodiscard]] double sigma_px() const;           // of the length: root of the trace
+};
+
+class RealityTruth {
+ public:
+  explicit RealityTruth(const simulator::Config& config);
+
+  [[nodiscard]] JudgedVector calibration_error(const FoundCalibration& found) const;
+  // Frame i begins at i / rate.
+  [[nodiscard]] FrameError frame_error(const FoundCalibration& found,
+                                       const FoundOrientation& orientation) const;
+  [[nodiscard]] double focal_length() const { return config_.camera.focal_length; }
+
+ private:
+  // From the truth's base and camera frame to those of the estimate.
+  struct Gauge {
+    Eigen::Matrix3d base, camera;
+  };
+  [[nodiscard]] Gauge gauge_of(const FoundCalibration& found) const;
+
+  simulator::Config config_;
+  std::unique_ptr<simulator::Path> path_;
+  simulator::CameraModel camera_;
+};
+
+// Of a recording: without the rotation of the base that fits best.
+[[nodiscard]] std::vector<FrameError> without_common_rotation(std::vector<FrameError> errors);
+
+struct SeedResult {
+  std::uint64_t seed = 0;
+  std::string refusal;  // why there is no calibration, or no replay
+  std::optional<JudgedVector> error;
+  JudgedMatrix covariance = JudgedMatrix::Zero();
+  int frames = 0;
+  std::vector<FrameError> frame_errors;
+};
+
+// Of the seeds that were calibrated.
+struct CalibrationStatistics {
+  int seeds = 0;
+  double anees = 0;  // of e' C^-1 e / 8
+  Interval chance;   // 99.9 %
+  int beyond = 0;    // values of more than kBeyondSigmas
+  double worst_sigmas = 0;
+  std::string worst;  // its name
+};
+inline constexpr double kBeyondSigmas = 4.5;
+[[nodiscard]] CalibrationStatistics calibration_statistics(const std::vector<SeedResult>& seeds);
+
+// Mean, ratio and root mean squares of frames in OE mode; the worst of all frames.
+struct ReplayStatistics {
+  int frames = 0, answered = 0, oe = 0;
+  double nees = 0, worst = 0;
+  double sigma_over_error = 0;
+  double rms_px = 0, relative_px = 0;
+  double pt_nees = 0;  // of the frames in PT mode
+};
+[[nodiscard]] ReplayStatistics replay_statistics(const std::vector<SeedResult>& seeds);
+
+// One line for each mark that is missed. Nothing that was not measured is missed.
+[[nodiscard]] std::vector<std::string> missed_marks(const CalibrationStatistics& calibration,
+                                                    const ReplayStatistics& replay,
+                                                    std::optional<double> most_relative);
+
+// Whether known errors give the known statistics, and sigmas of half the size are seen. One line says why not.
+[[nodiscard]] std::string yardsticks_fault();
+
+}  // namespace alidade::test
