@@ -129,6 +129,8 @@ OrientationStepOptions step_options(const Config& config, const PublishedCalibra
   OrientationStepOptions options = step_options(RecordingNoise{}, calibration);
   options.wait_for_pace = options.other_connection =
       config.video.type != VideoConfig::Type::kRecording;
+  options.unseen_delay_sigma_s =
+      config.calibration.clock_offset_sigma_s.value_or(options.unseen_delay_sigma_s);
   TelemetryNoise& noise = options.telemetry_noise;
   noise.pan_tilt_sigma = config.pan_tilt.angle_sigma_rad.value_or(noise.pan_tilt_sigma);
   noise.resolution = config.pan_tilt.angle_quantum_rad;

@@ -47,7 +47,12 @@ PipelineOptions pipeline_options(const Config& config, const PublishedCalibratio
   options.step = step_options(config, calibration);
   options.step.has_telemetry = has_telemetry(config);
   options.step.zoom_tolerance = config.calibration.zoom_tolerance;
-  if (config.realtime.landmarks) options.step.oe = oe_options(calibration.calibration.camera);
+  if (config.realtime.landmarks) {
+    options.step.oe = oe_options(calibration.calibration.camera);
+  } else {
+    options.step.follow_turns = options.step.other_connection && calibration.calibrated &&
+                                !config.calibration.clock_offset_sigma_s;
+  }
   options.realtime = {config.realtime.priority, config.realtime.cpu, config.realtime.lock_memory};
   options.width = calibration.calibration.camera.width;
   options.height = calibration.calibration.camera.height;
@@ -145,7 +150,8 @@ int run_live(const RunOptions& options) {
     of_video.width = of_pipeline.width;
     of_video.height = of_pipeline.height;
   }
-  const auto video = make_frame_source(of_video, config.realtime.landmarks);
+  const auto video =
+      make_frame_source(of_video, config.realtime.landmarks || of_pipeline.step.follow_turns);
   const auto pan_tilt = make_pan_tilt_source(config.pan_tilt);
   spdlog::info("video: {}; pan/tilt: {}", video->name(), pan_tilt->name());
   spdlog::info("real-time thread: {}", describe(of_pipeline.realtime));

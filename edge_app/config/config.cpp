@@ -61,6 +61,8 @@ CalibrationConfig read_calibration(YamlSection section, const std::string& path)
   if (const auto prior = section.text("prior")) calibration.prior = path_relative_to(path, *prior);
   calibration.automatic = section.truth("auto").value_or(calibration.automatic);
   calibration.zoom_tolerance = section.number("zoom_tolerance", {0, 1e6, "units of the device"});
+  if (const auto sigma_ms = section.number("clock_offset_sigma_ms", {0, 1000, "ms"}))
+    calibration.clock_offset_sigma_s = 1e-3 * *sigma_ms;
   section.finish();
   return calibration;
 }

@@ -22,7 +22,7 @@ void log_granted(const char* whose, const RealtimeReport& report) {
 }
 
 int processor_of_the_way(const PipelineOptions& options) {
-  if (options.step.oe) return -1;
+  if (options.step.oe || options.step.follow_turns) return -1;
   return options.realtime.cpu >= 0 ? options.realtime.cpu : ::sched_getcpu();
 }
 
@@ -171,7 +171,7 @@ void Pipeline::take_place(ThreadDuty duty) const {
   static_cast<void>(share_processor());
 }
 
-// In PT mode a record takes microseconds on each thread, and waking another processor takes longer.
+// In PT mode without pictures a record takes microseconds on each thread, and waking another processor takes longer.
 // So all threads on its way share one processor. At normal priority that is left to the kernel,
 // which knows the other load.
 bool Pipeline::share_processor() const {

@@ -44,18 +44,26 @@ OrientationStep::OrientationStep(const OrientationStepOptions& options)
       scene_lens_(options.calibration) {
   // A stored calibration was made over another connection.
   if (options.other_connection && options.calibrated) link_delay_.open(unseen_delay_sigma_s_);
-  if (!options.oe) return;
+  const Camera<double>& camera = options.calibration.camera;
+  const auto follow_points = [this, &camera] {
+    StartUpOptions start_up;
+    start_up.width = camera.width;
+    start_up.height = camera.height;
+    start_up.max_points = kMaxFramePoints;
+    start_up_ = std::make_unique<StartUpTracker>(start_up);
+  };
+  if (!options.oe) {
+    if (!options.follow_turns || !options.has_telemetry) return;
+    follow_points();
+    turns_ = std::make_unique<TurnChain>();
+    return;
+  }
   OeOptions oe = *options.oe;
-  oe.max_width = options.calibration.camera.width;
-  oe.max_height = options.calibration.camera.height;
+  oe.max_width = camera.width;
+  oe.max_height = camera.height;
   oe_ = make_oe_mode(oe);
   oe_->reset(options.calibration, options.map, focal_length());
-  if (!options.follow_points && options.has_telemetry) return;
-  StartUpOptions start_up;
-  start_up.width = oe.max_width;
-  start_up.height = oe.max_height;
-  start_up.max_points = kMaxFramePoints;
-  start_up_ = std::make_unique<StartUpTracker>(start_up);
+  if (options.follow_points || !options.has_telemetry) follow_points();
 }
 
 void OrientationStep::add_telemetry(const PanTiltSample& sample) {
@@ -176,7 +184,7 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
   if (!frame_time.known) {
     record.status = RecordStatus::kTimeUnknown;
     // The map would learn from an angle of another time.
-    if (finds_landmarks()) image_ = ImageView{};
+    if (finds_landmarks() || turns_) image_ = ImageView{};
     return record;
   }
   record.time_s = clock.time_s;
@@ -189,7 +197,10 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
   lasting_sigma_s_ = frame_time.off_line_s;
   double time_sigma_s = clock.sigma_s;
   QueryStatus query = ask_telemetry(telemetry_time_s, time_sigma_s, &measured);
-  if (repeated_images_.judge(image, clock.time_s, has_result(query) ? &measured : nullptr,
+  if (has_result(query)) measured_angle_ = measured.angle;
+  // A record in PT mode does not depend on the image.
+  const ImageView judged = oe_ ? image : ImageView{};
+  if (repeated_images_.judge(judged, clock.time_s, has_result(query) ? &measured : nullptr,
                              calibration.camera.focal_length)) {
     record.time_s.reset();
     record.status = RecordStatus::kImageRepeated;
@@ -303,6 +314,7 @@ void OrientationStep::maintain() {
   } else if (start_up_ && image_.valid()) {
     if (start_up_->process(image_) != StartUpStatus::kBadImage)
       tracks_.tracker = FrameTracks::Tracker::kStartUp;
+    if (turns_) follow_turn();
   }
   image_ = {};
 }

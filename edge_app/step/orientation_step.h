@@ -28,6 +28,7 @@
 #include "edge_app/step/scene_start.h"
 #include "edge_app/step/telemetry_intake.h"
 #include "edge_app/step/told_base.h"
+#include "edge_app/step/turn_chain.h"
 #include "platform/pan_tilt/pan_tilt_source.h"
 #include "platform/video/frame_source.h"
 
@@ -64,6 +65,8 @@ struct OrientationStepOptions {
   double minimum_delay_sigma_s = 5e-3;
   // s, the same for a connection whose delay nobody has seen yet: see link_delay.h.
   double unseen_delay_sigma_s = LinkDelay::kOpenSigma_s;
+  // In PT mode: there are images, in which points are followed so that they tell that delay.
+  bool follow_turns = false;
 };
 
 // Options of OE mode for a camera's images: small images get as many landmarks as large ones,
@@ -169,6 +172,8 @@ class OrientationStep {
   // What the frame added last shows of the head's motion, for the delay of the link.
   void show_motion();
   void show(const ImageAngles& image);
+  // In PT mode: how the head has turned since the image before, by points that are followed.
+  void follow_turn();
   // Passes on that motion has told the delay of the link.
   void tell_delay(StepEvents* events);
   // Completes a record that has its time and telemetry's status. measured: null if there is none.
@@ -215,6 +220,10 @@ class OrientationStep {
   std::uint32_t shown_map_ = 0;  // OE mode's map by which images show angles
   ImageAngles shown_;            // by the last image that showed them
   bool has_shown_ = false;
+  std::unique_ptr<TurnChain> turns_;  // null: images show angles by OE mode, or not at all
+  PanTilt<double> turned_;            // rad, true, by turns_, from any zero
+  PanTilt<double> measured_angle_;    // rad, telemetry's, of the frame added last
+  Vector2<double> turn_rate_ = Vector2<double>::Zero();  // rad/s, true, of the last turn
   Vector2<double> mean_rate_ = Vector2<double>::Zero();  // rad/s, of shown_, over a while
   // s: the part of a frame's time error that neighbouring frames share, but for link_delay_.
   double lasting_sigma_s_ = 0;

@@ -1,9 +1,12 @@
 // OrientationStep, the part with the delay of the links: what motion shows of it, and what it adds
 // to telemetry's covariance.
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
+#include "core/model/mechanics.h"
+#include "edge_app/step/frame_observations.h"
 #include "edge_app/step/orientation_step.h"
 
 namespace alidade {
@@ -12,6 +15,8 @@ namespace {
 constexpr double kRecent_s = 0.3;    // an image that still tells how the head moves
 constexpr double kSeenSigma = 1e-3;  // rad/s, of a rate from one image
 constexpr double kMean_s = 0.1;      // of the rate over a while
+constexpr double kBeginning =
+    0.2;  // rad/s^2, one standard deviation, of a head that begins to move
 
 // The variance of one axis has grown by `lasting`, which is the same in many frames: more frames do
 // not average it out.
@@ -93,9 +98,12 @@ QueryStatus OrientationStep::ask_telemetry(double time_s, double time_sigma_s,
     possible.take(seen, Vector2<double>::Constant(kSeenSigma * kSeenSigma));
     if (!possible.moves) {
       // At rest in the images as in the telemetry: the rate is as the images have it over a while.
+      // In PT mode, whose records do not wait for the image, it may have begun to move since.
+      const double since_s = turns_ ? by_calibration_s_ - shown_.time_s : 0;
+      const double begun = kBeginning * since_s * since_s / 2;
       for (int axis = 0; axis < 2; ++axis) {
         const double variance = square * mean_rate_[axis] * mean_rate_[axis];
-        out->covariance(axis, axis) += variance;
+        out->covariance(axis, axis) += variance + begun * begun;
         note_lasting(variance, before[axis], out);
       }
       return status;
@@ -140,6 +148,33 @@ void OrientationStep::show(const ImageAngles& image) {
   shown_ = image;
   has_shown_ = true;
   link_delay_.add(image);
+}
+
+void OrientationStep::follow_turn() {
+  if (tracks_.tracker == FrameTracks::Tracker::kStartUp) {
+    alidade::get_tracks(*start_up_, &tracks_);
+  } else {
+    tracks_.count = 0;
+  }
+  turns_->add(now_.calibration, tracks_);
+  if (!turns_->angular_velocity()) {
+    link_delay_.break_images();
+    has_shown_ = false;
+    return;
+  }
+  const Mechanics<double>& mechanics = now_.calibration.mechanics;
+  Matrix<double, 3, 2> J;
+  static_cast<void>(angular_velocity(mechanics, true_from_measured(mechanics, measured_angle_),
+                                     PanTilt<double>{}, nullptr, &J));
+  const Vector2<double> rate =
+      (J.transpose() * J).inverse() * (J.transpose() * *turns_->angular_velocity());
+  if (!all_finite(rate)) return;
+  turned_ = {turned_.pan + turns_->step_s() * rate.x(), turned_.tilt + turns_->step_s() * rate.y()};
+  // The turn's is the rate in its middle.
+  const Vector2<double> at_end = has_shown_ ? Vector2<double>(1.5 * rate - 0.5 * turn_rate_) : rate;
+  turn_rate_ = rate;
+  show({by_calibration_s_, measured_from_true(mechanics, turned_),
+        measured_from_true(mechanics, PanTilt<double>{at_end.x(), at_end.y()})});
 }
 
 void OrientationStep::tell_delay(StepEvents* events) {

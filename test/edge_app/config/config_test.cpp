@@ -261,7 +261,7 @@ TEST_F(ConfigTest, EveryKeyIsRead) {
           "camera: {focal_length_px: 30000, aspect: 1.01, radial_distortion: -2.5,\n"
           "         line_delay_s: 1.5e-5, upside_down: true, zoom: fixed}\n"
           "calibration: {file: /etc/c.yaml, prior: bench/lens.yaml, auto: false, zoom_tolerance: "
-          "2.5}\n"
+          "2.5, clock_offset_sigma_ms: 20}\n"
           "realtime: {mode: PT, priority: 60, cpu: 3, lock_memory: true, max_extrapolation_s: "
           "0.5}\n"
           "scene_map: {file: scene.map, interval_s: 3, zero_sigma_rad: 2e-4, on_moved_base: "
@@ -301,6 +301,7 @@ TEST_F(ConfigTest, EveryKeyIsRead) {
   EXPECT_EQ(config_.calibration.prior, directory_.path() + "/bench/lens.yaml");
   EXPECT_FALSE(config_.calibration.automatic);
   EXPECT_EQ(config_.calibration.zoom_tolerance, 2.5);
+  EXPECT_EQ(config_.calibration.clock_offset_sigma_s, 0.02);
   EXPECT_EQ(config_.scene_map.file, directory_.path() + "/scene.map");
   EXPECT_EQ(config_.scene_map.interval_s, 3);
   EXPECT_EQ(config_.scene_map.zero_sigma_rad, 2e-4);

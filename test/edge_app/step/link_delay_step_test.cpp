@@ -50,6 +50,7 @@ class LinkDelayStep : public testing::Test {
     double told_delay_s = 0;
     double told_sigma_s = 0;
     int tellings = 0;
+    double time_sigma_s = 0;  // of the last record
   };
 
   static void SetUpTestSuite() {
@@ -127,6 +128,7 @@ class LinkDelayStep : public testing::Test {
         seen.told_sigma_s = events.link_delay_sigma_s;
         ++seen.tellings;
       }
+      seen.time_sigma_s = record.time_sigma_s;
       if (!record.orientation) continue;
       ++seen.records;
       seen.landmarks += record.mode == RecordMode::kOe ? 1 : 0;
@@ -169,6 +171,32 @@ TEST_F(LinkDelayStep, TheSameIfItMovesWhenTheProgramStarts) {
     EXPECT_LT(seen.told_s, 50 / kFrames_hz + 2);
     EXPECT_LT(std::abs(seen.told_delay_s - delay_s), 5 * seen.told_sigma_s);
   }
+}
+
+TEST_F(LinkDelayStep, TheSameInPtModeByPointsThatAreFollowed) {
+  OrientationStepOptions without_landmarks = options();
+  without_landmarks.oe.reset();
+  without_landmarks.follow_turns = true;
+  for (const double delay_s : {-0.3, -0.085, -0.02, 0.0, 0.02, 0.085, 0.2}) {
+    const Seen seen = run(without_landmarks, delay_s, 1);
+    SCOPED_TRACE(delay_s);
+    EXPECT_EQ(seen.landmarks, 0);
+    EXPECT_EQ(seen.beyond, 0);
+    EXPECT_EQ(seen.tellings, 1);
+    EXPECT_LT(seen.told_s, kMoves_s + 2);
+    EXPECT_LT(std::abs(seen.told_delay_s - delay_s), 5 * seen.told_sigma_s);
+  }
+}
+
+// Where nobody looks at pictures the configuration says how sure the delay is.
+TEST_F(LinkDelayStep, WithoutPicturesTheDelayStaysAsSureAsStated) {
+  OrientationStepOptions blind = options();
+  blind.oe.reset();
+  blind.unseen_delay_sigma_s = 0.02;
+  const Seen seen = run(blind, 0.02, 1);
+  EXPECT_EQ(seen.tellings, 0);
+  EXPECT_EQ(seen.beyond, 0);
+  EXPECT_NEAR(seen.time_sigma_s, 0.02, 1e-5);
 }
 
 }  // namespace
