@@ -41,6 +41,7 @@ OrientationStep::OrientationStep(const OrientationStepOptions& options)
       minimum_delay_sigma_s_(
           options.other_connection && options.calibrated ? options.minimum_delay_sigma_s : 0),
       scene_lens_(options.calibration) {
+  telemetry_.correct_by(options.calibration.mechanics, options.telemetry_error);
   if (!options.oe) return;
   OeOptions oe = *options.oe;
   oe.max_width = options.calibration.camera.width;
@@ -127,6 +128,7 @@ void OrientationStep::adopt(const PublishedCalibration& published) {
   now_.calibration = published.calibration;
   now_.calibrated = published.calibrated;
   now_.zoom_curve = published.zoom_curve;
+  telemetry_.correct_by(published.calibration.mechanics, published.telemetry_error);
   zoom_.note_adoption();
   // A withdrawn calibration's clock offset stays in use.
   if (!published.of_this_connection) {
