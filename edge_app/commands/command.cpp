@@ -155,6 +155,7 @@ OrientationStepOptions step_options(const RecordingNoise& noise,
   options.calibration = calibration.calibration;
   options.calibrated = calibration.calibrated;
   options.zoom_curve = calibration.zoom_curve;
+  options.telemetry_error = calibration.telemetry_error;
   options.video_clock =
       clock(noise.image_stamp_sigma_s, noise.image_period_s, noise.image_period_sigma_s);
   // RTP's clock, the coarsest of all live video streams.

@@ -42,6 +42,7 @@ OrientationStep::OrientationStep(const OrientationStepOptions& options)
                              options.telemetry_noise.resolution / std::sqrt(12.0)),
                   options.minimum_delay_sigma_s),
       scene_lens_(options.calibration) {
+  telemetry_.correct_by(options.calibration.mechanics, options.telemetry_error);
   // A stored calibration was made over another connection.
   if (options.other_connection && options.calibrated) link_delay_.open(unseen_delay_sigma_s_);
   const Camera<double>& camera = options.calibration.camera;
@@ -129,6 +130,7 @@ void OrientationStep::adopt(const PublishedCalibration& published) {
   now_.calibration = published.calibration;
   now_.calibrated = published.calibrated;
   now_.zoom_curve = published.zoom_curve;
+  telemetry_.correct_by(published.calibration.mechanics, published.telemetry_error);
   zoom_.note_adoption();
   note_curve_here();
   if (oe_ && !keep) oe_->reset(published.calibration, published.map, focal_length());

@@ -37,6 +37,7 @@ namespace alidade {
 struct OrientationStepOptions {
   Calibration calibration;
   bool calibrated = false;  // false: data-sheet values; landmarks are then not looked for
+  TelemetryError telemetry_error;
   // Receive times are arrivals: frames and telemetry may have waited before.
   bool wait_for_pace = false;
   // The calibration, if calibrated, was made over another connection, whose least delay may differ.

@@ -10,6 +10,7 @@ TelemetryIntake::Samples TelemetryIntake::empty(bool filtered) const {
   // beyond every stamp's sigma expresses.
   constexpr double kAllOwn_s = 1e3;
   TelemetryNoise noise = options_.noise;
+  noise.resolution = std::max(noise.resolution, resolution_);
   if (!filtered) noise.period_sigma_s = kAllOwn_s;
   return Samples(noise, options_.limits);
 }
@@ -40,6 +41,8 @@ TelemetryIntake::Taken TelemetryIntake::add(const PanTiltSample& sample) {
   if (out.restarted) {
     samples_ = empty(filtered);
     filtered_ = filtered;
+    measured_count_ = 0;
+    correction_.forget_state();
   }
   is_lost_ = false;
 
@@ -56,11 +59,49 @@ TelemetryIntake::Taken TelemetryIntake::add(const PanTiltSample& sample) {
     timed.time_s = sample.latest_time_s - width_s / 2;
     timed.time_sigma_s = width_s > 0 ? width_s / std::sqrt(12.0) : options_.stamp_sigma_s;
   }
-  // The buffer counts what it refuses (a duplicate, a value that is not finite), and the records'
-  // sigma shows the effect.
-  static_cast<void>(samples_.push(timed));
+  measured_[measured_count_ % kMeasuredKept] = timed;
+  ++measured_count_;
+  step_.add(timed.pan, timed.tilt);
+  if (resolution_shown() != resolution_) {
+    resolution_ = resolution_shown();
+    store_again();
+  } else {
+    store(timed);
+  }
   out.time_s = timed.time_s;
   return out;
+}
+
+void TelemetryIntake::store(const TelemetrySample& measured) {
+  const std::optional<double> newest_s = samples_.newest_time();
+  if (newest_s && measured.time_s > *newest_s + options_.limits.max_gap_s) {
+    correction_.forget_state();
+  }
+  TelemetrySample corrected = measured;
+  correction_.correct(&corrected);
+  static_cast<void>(samples_.push(corrected));
+}
+
+void TelemetryIntake::correct_by(const Mechanics<double>& mechanics, const TelemetryError& error) {
+  if (!error.exists() && !correction_.exists()) return;
+  correction_ = TelemetryCorrection(mechanics, error, options_.noise.pan_tilt_sigma);
+  store_again();
+}
+
+double TelemetryIntake::resolution_shown() const {
+  constexpr double kDither = 0.25;
+  if (options_.noise.resolution > 0) return options_.noise.resolution;
+  const double step = step_.step();
+  return options_.noise.pan_tilt_sigma < kDither * step ? step : 0;
+}
+
+void TelemetryIntake::store_again() {
+  correction_.forget_state();
+  samples_ = empty(filtered_);
+  const std::size_t kept = std::min(measured_count_, kMeasuredKept);
+  for (std::size_t i = measured_count_ - kept; i < measured_count_; ++i) {
+    store(measured_[i % kMeasuredKept]);
+  }
 }
 
 }  // namespace alidade

@@ -1,13 +1,18 @@
 #pragma once
 // TelemetryIntake: pan/tilt samples as they come, with the time of their clock (capture_clock.h) or
 // of their poll, in a buffer that frames query (telemetry_buffer.h). It is emptied when the
-// connection or the clock restarts, or the times begin to be of the other kind. Fixed memory; no
-// allocation. One thread.
+// connection or the clock restarts, or the times begin to be of the other kind. What the calibration
+// knows of the angles' error is taken out (telemetry_correction.h). Fixed memory; no allocation.
+// One thread.
 
+#include <array>
+#include <cstddef>
 #include <optional>
 
 #include "core/model/clock_filter.h"
+#include "core/realtime/telemetry/angle_step.h"
 #include "core/realtime/telemetry/telemetry_buffer.h"
+#include "core/realtime/telemetry/telemetry_correction.h"
 #include "edge_app/clocks/capture_clock.h"
 #include "platform/pan_tilt/pan_tilt_source.h"
 
@@ -17,7 +22,7 @@ struct TelemetryIntakeOptions {
   ClockFilterOptions clock;
   // s, one standard deviation of a receive time that is used as the capture time.
   double stamp_sigma_s = 5e-3;
-  // Its period_sigma_s applies to filtered times only.
+  // Its period_sigma_s applies to filtered times only. resolution 0: what the readings show.
   TelemetryNoise noise;
   TelemetryLimits limits;
   // True: samples of stalled polls are left out, as nobody knows when they were true, unless a
@@ -28,7 +33,10 @@ struct TelemetryIntakeOptions {
 class TelemetryIntake {
  public:
   explicit TelemetryIntake(const TelemetryIntakeOptions& options)
-      : options_(options), clock_(options.clock), samples_(empty(false)) {}
+      : options_(options),
+        clock_(options.clock),
+        resolution_(options.noise.resolution),
+        samples_(empty(false)) {}
 
   struct Taken {
     bool restarted = false;        // earlier times cannot be asked for any more
@@ -36,27 +44,48 @@ class TelemetryIntake {
   };
   Taken add(const PanTiltSample& sample);
   // The connection was lost. The next sample ends that state.
-  void note_lost() { is_lost_ = true; }
+  void note_lost() {
+    is_lost_ = true;
+    correction_.forget_state();
+  }
+  // From now on, and for the latest samples, the errors of these angles are known.
+  void correct_by(const Mechanics<double>& mechanics, const TelemetryError& error);
   [[nodiscard]] bool is_lost() const { return is_lost_; }
 
   // See TelemetryBuffer.
   [[nodiscard]] QueryStatus query(double time_s, double time_sigma_s,
                                   InterpolatedPanTilt* out) const {
-    return samples_.query(time_s, time_sigma_s, out);
+    const QueryStatus status = samples_.query(time_s, time_sigma_s, out);
+    if (has_result(status)) correction_.add_left(out);
+    return status;
   }
   [[nodiscard]] std::optional<double> newest_time() const { return samples_.newest_time(); }
 
  private:
   static constexpr std::size_t kSamplesKept = 1024;
   using Samples = TelemetryBuffer<kSamplesKept>;
+  // The latest samples as measured: more than frames that wait ask for.
+  static constexpr std::size_t kMeasuredKept = 256;
 
   [[nodiscard]] Samples empty(bool filtered) const;
   [[nodiscard]] bool is_stalled_poll(const PanTiltSample& sample);
+  // Corrects it and puts it into the buffer, which counts what it refuses (a duplicate, a value that
+  // is not finite); the records' sigma shows the effect.
+  void store(const TelemetrySample& measured);
+  // Fills the buffer anew with the latest samples as measured.
+  void store_again();
+  // White noise of a quarter of a step or more dithers the readings: then the step does not matter.
+  [[nodiscard]] double resolution_shown() const;
 
   TelemetryIntakeOptions options_;
   CaptureClock clock_;
+  double resolution_;  // rad, in use
   Samples samples_;
-  bool filtered_ = false;  // the times in samples_ come from clock_
+  TelemetryCorrection correction_;
+  AngleStep step_;
+  std::array<TelemetrySample, kMeasuredKept> measured_{};  // ring buffer
+  std::size_t measured_count_ = 0;                         // since the buffer was emptied
+  bool filtered_ = false;                                  // the times in samples_ come from clock_
   bool is_lost_ = false;
   double usual_poll_s_ = 0.01;  // s, from a poll to its answer
 };

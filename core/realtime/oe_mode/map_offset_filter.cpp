@@ -58,8 +58,18 @@ bool MapOffset::learn(const Vector2<double>& innovation,
   return true;
 }
 
+AngleError angle_error(const Mechanics<double>& mechanics, const InterpolatedPanTilt& telemetry) {
+  const Vector2<double> to_true(1 / mechanics.pan_scale, 1 / mechanics.tilt_scale);
+  AngleError out;
+  out.angle = true_from_measured(mechanics, telemetry.angle).vector();
+  out.variance = to_true.cwiseAbs2().cwiseProduct(telemetry.error_variance);
+  out.length = telemetry.error_length;
+  return out;
+}
+
 void MapOffsetFilter::reset(const MapOffset& offset) {
   offset_ = offset;
+  for (OffsetAxisCells& cells : cells_) cells.clear();
   learnt_time_s_ = kNever;
   answered_time_s_ = kNever;
   contradicted_ = false;
@@ -73,33 +83,141 @@ double MapOffsetFilter::inflation(const InterpolatedPanTilt& telemetry, double f
   return variance_inflation(telemetry.correlation_time_s, frame_time_s - before_s);
 }
 
+void MapOffsetFilter::widen(const Calibration& calibration, InterpolatedPanTilt* telemetry) const {
+  const Vector2<double> scale(calibration.mechanics.pan_scale, calibration.mechanics.tilt_scale);
+  for (int i = 0; i < 2; ++i) {
+    const OffsetAxisCells& cells = cells_[static_cast<std::size_t>(i)];
+    const double by = scale[i] * scale[i] * cells.learnt_variance();
+    if (by == 0) continue;
+    if (by > telemetry->error_variance[i]) telemetry->error_length[i] = cells.learnt_length();
+    telemetry->error_variance[i] += by;
+    telemetry->covariance(i, i) += by;
+  }
+}
+
+AngleErrorShare MapOffsetFilter::share(const AngleError& error,
+                                       const Vector2<double>& noise) const {
+  AngleErrorShare out;
+  out.variance = error.variance;
+  for (int i = 0; i < 2; ++i) {
+    const OffsetAxisCells::Expected expected = cells_[static_cast<std::size_t>(i)].expected(
+        error.angle[i], error.variance[i], error.length[i]);
+    const double by = 1 / (1 - expected.weight);
+    out.repeated[i] = by * by * (noise[i] + expected.variance) - noise[i] - error.variance[i];
+  }
+  return out;
+}
+
 void MapOffsetFilter::drift(double elapsed_s) {
   offset_.covariance.diagonal().array() += options_.drift * options_.drift * elapsed_s;
   if (lens_.learnt) lens_.variance += options_.lens_drift * options_.lens_drift * elapsed_s;
 }
 
 void MapOffsetFilter::begin(double frame_time_s, const Matrix2<double>& angle_covariance,
-                            bool extrapolated) {
+                            bool extrapolated, const AngleError& error) {
   offset_ = {Vector2<double>::Zero(), angle_covariance, Sensitivity<2>::Zero()};
+  for (OffsetAxisCells& cells : cells_) cells.clear();
+  OffsetInnovation first;
+  first.error = error;
+  note_in_cells(frame_time_s, first, Vector2<double>::Zero(),
+                angle_covariance.diagonal() - error.variance,
+                angle_covariance.diagonal().cwiseInverse());
   lens_.covariance_with_offset.setZero();
   answered_time_s_ = frame_time_s;
   if (!extrapolated) learnt_time_s_ = frame_time_s;
 }
 
-bool MapOffsetFilter::learn(double frame_time_s, const OffsetInnovation& innovation) {
+Matrix2<double> MapOffsetFilter::noise_of(double frame_time_s,
+                                          const OffsetInnovation& innovation) const {
   const double inflation =
       variance_inflation(options_.shared_correlation_time_s, frame_time_s - learnt_time_s_);
-  const Matrix2<double> covariance =
-      innovation.covariance + inflation * innovation.shared_covariance;
-  if (lens_.learnt ? !offset_.learn(innovation.value, covariance, innovation.by_calibration,
-                                    innovation.sensitivity, innovation.by_lens,
-                                    options_.max_contradiction, &lens_)
-                   : !offset_.learn(innovation.value, covariance, innovation.sensitivity,
-                                    options_.max_contradiction)) {
+  return innovation.covariance + inflation * innovation.shared_covariance;
+}
+
+bool MapOffsetFilter::learn(double frame_time_s, const OffsetInnovation& innovation) {
+  const Matrix2<double> covariance = noise_of(frame_time_s, innovation);
+  const Vector2<double> before = offset_.covariance.diagonal();
+  const Vector2<double> seen = offset_.value + innovation.value - lens_.value * innovation.by_lens;
+  if (innovation.error.exists()
+          ? !learn_beside_error(innovation, covariance)
+          : !learn_offset(innovation, covariance, options_.max_contradiction)) {
+    note_contradiction(frame_time_s, innovation);
     return false;
   }
+  note_in_cells(frame_time_s, innovation, seen, covariance.diagonal(),
+                offset_.covariance.diagonal().cwiseInverse() - before.cwiseInverse());
   learnt_time_s_ = frame_time_s;
   return true;
+}
+
+void MapOffsetFilter::note_contradiction(double frame_time_s, const OffsetInnovation& innovation) {
+  const Vector2<double> left = innovation.value - lens_.value * innovation.by_lens;
+  if (!(left.cwiseAbs().maxCoeff() < OffsetAxisCells::kLargestError_rad)) return;
+  note_in_cells(frame_time_s, innovation, offset_.value + left,
+                noise_of(frame_time_s, innovation).diagonal(), Vector2<double>::Zero());
+}
+
+bool MapOffsetFilter::learn_offset(const OffsetInnovation& innovation,
+                                   const Matrix2<double>& covariance, double max_chi_square) {
+  if (lens_.learnt) {
+    return offset_.learn(innovation.value, covariance, innovation.by_calibration,
+                         innovation.sensitivity, innovation.by_lens, max_chi_square, &lens_);
+  }
+  return offset_.learn(innovation.value, covariance, innovation.sensitivity, max_chi_square);
+}
+
+// One Kalman step takes what was said near this angle from before to now: docs/oe_mode.md.
+bool MapOffsetFilter::learn_beside_error(const OffsetInnovation& innovation,
+                                         const Matrix2<double>& covariance) {
+  const AngleError& error = innovation.error;
+  const Vector2<double> left = innovation.value - lens_.value * innovation.by_lens;
+  Matrix2<double> expected = covariance + offset_.covariance + innovation.by_calibration;
+  expected.diagonal() += error.variance;
+  if (!(left.dot(inverse_of(expected) * left) < options_.max_contradiction)) return false;
+  OffsetInnovation step = innovation;
+  Matrix2<double> of_step = covariance;
+  for (int i = 0; i < 2; ++i) {
+    const OffsetAxisCells::Expected g = cells_[static_cast<std::size_t>(i)].expected(
+        error.angle[i], error.variance[i], error.length[i]);
+    const double by = 1 / (1 - g.weight);
+    step.value[i] += (by - 1) * (offset_.value[i] + left[i] - g.mean);
+    of_step(i, i) += g.variance;
+    of_step.row(i) *= by;
+    of_step.col(i) *= by;
+  }
+  return learn_offset(step, of_step, std::numeric_limits<double>::infinity());
+}
+
+void MapOffsetFilter::note_in_cells(double frame_time_s, const OffsetInnovation& innovation,
+                                    const Vector2<double>& offset, const Vector2<double>& variance,
+                                    const Vector2<double>& used) {
+  for (int i = 0; i < 2; ++i) {
+    OffsetAxisCells& cells = cells_[static_cast<std::size_t>(i)];
+    if (!(variance[i] > 0) || !std::isfinite(innovation.error.angle[i])) continue;
+    cells.add({innovation.error.angle[i], offset[i], variance[i],
+               std::isfinite(used[i]) ? std::max(0.0, used[i]) : 0,
+               std::max(0.0, innovation.error.variance[i] - cells.learnt_variance()),
+               innovation.calibration_variance[i], frame_time_s},
+              options_.drift);
+  }
+  learn_error();
+}
+
+// Both axes are of one make: what one does not show, the other does.
+void MapOffsetFilter::learn_error() {
+  constexpr double kWorth = 4;  // degrees of freedom, of the other axis
+  const std::array<OffsetAxisCells::Scatter, 2> own = {cells_[0].scatter(), cells_[1].scatter()};
+  for (std::size_t i = 0; i < 2; ++i) {
+    OffsetAxisCells::Scatter error = own[i];
+    const OffsetAxisCells::Scatter& other = own[1 - i];
+    if (error.freedom == 0 && other.freedom == 0) continue;
+    if (other.variance > error.variance) {
+      error.variance += kWorth / (kWorth + error.freedom) * (other.variance - error.variance);
+      if (!(error.length > 0)) error.length = other.length;
+    }
+    const auto axis = static_cast<Eigen::Index>(i);
+    cells_[i].take_error(error, &offset_.covariance(axis, axis));
+  }
 }
 
 void MapOffsetFilter::learn_scale(double frame_time_s, double measurement, double information,
@@ -143,8 +261,10 @@ void MapOffsetFilter::settle_oldest(const Calibration& calibration,
   if (late == nullptr || late->extrapolated) return;
   const Mechanics<double>& mechanics = calibration.mechanics;
   const Vector2<double> to_true(1 / mechanics.pan_scale, 1 / mechanics.tilt_scale);
-  const Matrix2<double> covariance =
+  const AngleError error = angle_error(mechanics, *late);
+  Matrix2<double> covariance =
       to_true.asDiagonal() * late->covariance.topLeftCorner<2, 2>() * to_true.asDiagonal();
+  covariance.diagonal() -= error.variance;
   const FrameMotion<double> motion{true_from_measured(mechanics, late->angle),
                                    true_from_measured(mechanics, late->rate),
                                    0.5 * calibration.camera.height};
@@ -159,6 +279,8 @@ void MapOffsetFilter::settle_oldest(const Calibration& calibration,
   innovation.shared_covariance = frame.shared_covariance;
   innovation.by_calibration = frame.by_calibration;
   if (lens_.learnt) innovation.by_lens = frame.sensitivity * lens_.direction;
+  innovation.error = error;
+  innovation.calibration_variance = variance_by(calibration, innovation.sensitivity);
   if (!all_finite(innovation.value) || !all_finite(covariance)) return;
   contradicted_ = !learn(frame.frame_time_s, innovation);
 }

@@ -4,10 +4,10 @@
 //   base angle = map angle + offset
 // Extrapolated telemetry teaches nothing yet: its frame waits until telemetry encloses its time. Up
 // to kMaxPending frames wait; each is settled once, the oldest first. Without room the oldest is
-// dropped. Samples and landmarks that were used before count less, by variance_inflation(). A
-// learnt focal length (lens_scale.h) joins the filter: (offset, phi). An innovation that
-// contradicts offset and landmarks is rejected, see contradicted(). Fixed memory; no allocation.
-// One thread. Derivation: docs/oe_mode.md.
+// dropped. Samples and landmarks that were used before count less, by variance_inflation(); errors
+// that go with the angle, by offset_cells.h. A learnt focal length (lens_scale.h) joins the filter:
+// (offset, phi). An innovation that contradicts offset and landmarks is rejected, see
+// contradicted(). Fixed memory; no allocation. One thread. Derivation: docs/oe_mode.md.
 
 #include <array>
 #include <cstddef>
@@ -16,6 +16,7 @@
 #include "core/model/calibration.h"
 #include "core/realtime/oe_mode/covariance.h"
 #include "core/realtime/oe_mode/lens_scale.h"
+#include "core/realtime/oe_mode/offset_cells.h"
 #include "core/realtime/telemetry/telemetry_interpolation.h"
 
 namespace alidade {
@@ -52,15 +53,27 @@ struct MapOffset {
                            const Vector2<double>& by_lens, double max_chi_square, LensScale* lens);
 };
 
+// rad^2, of (pan, tilt) that depend on the parameters like this.
+[[nodiscard]] inline Vector2<double> variance_by(const Calibration& calibration,
+                                                 const Sensitivity<2>& sensitivity) {
+  return (sensitivity * calibration.covariance).cwiseProduct(sensitivity).rowwise().sum();
+}
+
+[[nodiscard]] AngleError angle_error(const Mechanics<double>& mechanics,
+                                     const InterpolatedPanTilt& telemetry);
+
 // Telemetry's angles minus the map's in a frame, with covariances that leave out the offset's.
 struct OffsetInnovation {
   Vector2<double> value = Vector2<double>::Zero();       // rad
-  Matrix2<double> covariance = Matrix2<double>::Zero();  // rad^2, from noise
+  Matrix2<double> covariance = Matrix2<double>::Zero();  // rad^2, from noise, without error's
   Matrix2<double> shared_covariance =
       Matrix2<double>::Zero();  // rad^2, from the landmarks' common error
   Matrix2<double> by_calibration = Matrix2<double>::Zero();  // rad^2, see SolvedZoom
   Sensitivity<2> sensitivity = Sensitivity<2>::Zero();
   Vector2<double> by_lens = Vector2<double>::Zero();  // rad per unit of phi; see MapOffset::learn()
+  AngleError error = {};
+  // rad^2, of value, by the calibration's errors.
+  Vector2<double> calibration_variance = Vector2<double>::Zero();
 };
 
 // A frame answered with extrapolated telemetry.
@@ -109,14 +122,28 @@ class MapOffsetFilter {
   // used before is only partly new.
   [[nodiscard]] double inflation(const InterpolatedPanTilt& telemetry, double frame_time_s) const;
 
+  // Adds to telemetry what was learnt of its error that was not told.
+  void widen(const Calibration& calibration, InterpolatedPanTilt* telemetry) const;
+  [[nodiscard]] bool has_learnt_error() const {
+    return cells_[0].learnt_variance() > 0 || cells_[1].learnt_variance() > 0;
+  }
+  void forget_error() {
+    for (OffsetAxisCells& cells : cells_) cells.forget_error();
+  }
+  // noise: rad^2, of telemetry's angles without that error.
+  [[nodiscard]] AngleErrorShare share(const AngleError& error, const Vector2<double>& noise) const;
+
   // elapsed_s has passed, and the offset may have drifted.
   void drift(double elapsed_s);
 
   // The map begins anew in a frame that telemetry alone answered. The offset is 0, with the
   // covariance of that answer.
-  void begin(double frame_time_s, const Matrix2<double>& angle_covariance, bool extrapolated);
+  void begin(double frame_time_s, const Matrix2<double>& angle_covariance, bool extrapolated,
+             const AngleError& error = {});
   // A frame was answered with telemetry that was not extrapolated. False if nothing was learnt.
   bool learn(double frame_time_s, const OffsetInnovation& innovation);
+  // Telemetry contradicted the landmarks in a frame. Whether by its angle, the cells will show.
+  void note_contradiction(double frame_time_s, const OffsetInnovation& innovation);
   // A frame was answered, by anything.
   void note_answer(double frame_time_s) { answered_time_s_ = frame_time_s; }
 
@@ -134,7 +161,10 @@ class MapOffsetFilter {
 
   // For moved landmarks. move_offset() adds to the offset. correct_pending() subtracts error(angle)
   // from the angles that the map gave to pending frames.
-  void move_offset(const Vector2<double>& by) { offset_.value += by; }
+  void move_offset(const Vector2<double>& by) {
+    offset_.value += by;
+    for (int i = 0; i < 2; ++i) cells_[static_cast<std::size_t>(i)].move(by[i]);
+  }
   template <class Error>
   void correct_pending(const Error& error) {
     for (std::size_t i = 0; i < pending_count_; ++i) {
@@ -146,12 +176,24 @@ class MapOffsetFilter {
  private:
   static constexpr double kNever = -std::numeric_limits<double>::infinity();
 
+  [[nodiscard]] Matrix2<double> noise_of(double frame_time_s,
+                                         const OffsetInnovation& innovation) const;
+  void learn_error();
+  [[nodiscard]] bool learn_offset(const OffsetInnovation& innovation,
+                                  const Matrix2<double>& covariance, double max_chi_square);
+  [[nodiscard]] bool learn_beside_error(const OffsetInnovation& innovation,
+                                        const Matrix2<double>& covariance);
+  void note_in_cells(double frame_time_s, const OffsetInnovation& innovation,
+                     const Vector2<double>& offset, const Vector2<double>& variance,
+                     const Vector2<double>& used);
+
   [[nodiscard]] PendingFrame& pending_at(std::size_t i) {
     return pending_[(first_pending_ + i) % kMaxPending];
   }
 
   MapOffsetOptions options_;
   MapOffset offset_;
+  std::array<OffsetAxisCells, 2> cells_;  // pan, tilt
   LensScale lens_;
   double scale_learnt_time_s_ = kNever;  // s, the last frame whose landmarks' scale was learnt from
   double learnt_time_s_ = kNever;        // s, the last frame whose telemetry was learnt from

@@ -40,7 +40,8 @@ void MotionPrediction::change_lens(const Calibration& calibration) {
 
 PredictedMotion MotionPrediction::by_telemetry(const Calibration& calibration,
                                                const InterpolatedPanTilt& telemetry,
-                                               const MapOffset& offset, double inflation) const {
+                                               const MapOffset& offset, double inflation,
+                                               const AngleErrorShare& error) const {
   const Mechanics<double>& mechanics = calibration.mechanics;
   PredictedMotion out;
   const PanTilt<double> angle = true_from_measured(mechanics, telemetry.angle);
@@ -67,7 +68,12 @@ PredictedMotion MotionPrediction::by_telemetry(const Calibration& calibration,
   out.prior.telemetry_sensitivity = out.sensitivity.topRows<4>();
   const double factor = std::sqrt(inflation);
   const Vector4<double> inflate(factor, factor, 1, 1);
-  out.prior.telemetry_covariance = inflate.asDiagonal() * covariance * inflate.asDiagonal();
+  Matrix4<double> noise = covariance;
+  noise.diagonal().head<2>() -= error.variance;
+  out.prior.telemetry_covariance = inflate.asDiagonal() * noise * inflate.asDiagonal();
+  out.prior.telemetry_covariance.diagonal().head<2>() += error.variance + error.repeated;
+  out.prior.error_variance = error.variance;
+  out.prior.repeated_variance = error.repeated;
   out.prior.motion_information.diagonal().tail<2>().setConstant(
       1 / (acceleration_sigma * acceleration_sigma));
   return out;

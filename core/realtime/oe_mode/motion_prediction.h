@@ -49,10 +49,12 @@ class MotionPrediction {
   // Forgets the previous frame.
   void forget() { has_last_ = false; }
 
-  // inflation: of the variance of telemetry's angles, see MapOffsetFilter::inflation().
+  // inflation: of the variance of telemetry's angles, see MapOffsetFilter::inflation(). error:
+  // see MapOffsetFilter::share().
   [[nodiscard]] PredictedMotion by_telemetry(const Calibration& calibration,
                                              const InterpolatedPanTilt& telemetry,
-                                             const MapOffset& offset, double inflation) const;
+                                             const MapOffset& offset, double inflation,
+                                             const AngleErrorShare& error = {}) const;
   // Needs follows(frame_time_s).
   [[nodiscard]] PredictedMotion by_last_frame(double frame_time_s) const;
 

@@ -41,6 +41,7 @@ void OeMode::reset(const Calibration& calibration, FocalLength focal_length) {
   image_.reset(camera.height);
   search_.reset(calibration);
   map_.reset(calibration);
+  offset_.forget_error();
   forget_map();
   frames_ = 0;
 }
@@ -48,6 +49,12 @@ void OeMode::reset(const Calibration& calibration, FocalLength focal_length) {
 OeStatus OeMode::process(const ImageView& image, double frame_time_s,
                          const InterpolatedPanTilt* telemetry, const FrameLens* lens,
                          FrameOrientation* out) {
+  InterpolatedPanTilt widened;
+  if (telemetry != nullptr && offset_.has_learnt_error()) {
+    widened = *telemetry;
+    offset_.widen(calibration_.of_frame(), &widened);
+    telemetry = &widened;
+  }
   begin_frame(image, frame_time_s, telemetry);
   if (!std::isfinite(frame_time_s)) return finish(OeStatus::kNotFinite);
   if (!ready_) return finish(OeStatus::kNoPrediction);
@@ -67,10 +74,7 @@ OeStatus OeMode::process(const ImageView& image, double frame_time_s,
 
   // 1. Prediction.
   PredictedMotion predicted =
-      telemetry != nullptr
-          ? prediction_.by_telemetry(calibration_.of_frame(), *telemetry, offset_.offset(),
-                                     offset_.inflation(*telemetry, frame_time_s))
-          : prediction_.by_last_frame(frame_time_s);
+      telemetry != nullptr ? by_telemetry(*telemetry) : prediction_.by_last_frame(frame_time_s);
   predicted.motion.zoom_rate = own_lens() != nullptr ? calibration_.lens().expected().value[1] : 0;
   double sigma_px =
       camera().focal_length * std::sqrt(predicted.angle_covariance.diagonal().maxCoeff());
@@ -111,11 +115,39 @@ void OeMode::begin_frame(const ImageView& image, double frame_time_s,
   frame_.use = MapUse::kNone;
   frame_.image = image;
   frame_.telemetry = FrameTelemetry::kNone;
+  frame_.error = {};
   if (telemetry == nullptr) return;
   frame_.telemetry =
       telemetry->extrapolated ? FrameTelemetry::kExtrapolated : FrameTelemetry::kEnclosed;
   frame_.look_up_time_s = telemetry->time_s;
   frame_.look_up_sigma_s = telemetry->time_sigma_s;
+}
+
+PredictedMotion OeMode::by_telemetry(const InterpolatedPanTilt& telemetry) {
+  const Calibration& calibration = calibration_.of_frame();
+  const double inflation = offset_.inflation(telemetry, frame_.time_s);
+  frame_.error = angle_error(calibration.mechanics, telemetry);
+  AngleErrorShare share;
+  if (frame_.error.exists()) {
+    const Vector2<double> noise =
+        inflation * (telemetry.covariance.diagonal().head<2>() - telemetry.error_variance);
+    share = offset_.share(frame_.error, noise);
+  }
+  return prediction_.by_telemetry(calibration, telemetry, offset_.offset(), inflation, share);
+}
+
+OffsetInnovation OeMode::innovation_of(const PredictedMotion& predicted,
+                                       const SolvedMotion& solved) const {
+  const Sensitivity<2> sensitivity =
+      predicted.prior.telemetry_sensitivity.topRows<2>() - solved.sensitivity.topRows<2>();
+  return {solved.innovation,
+          solved.innovation_covariance,
+          solved.shared_covariance,
+          solved.zoom.innovation_by_calibration,
+          sensitivity,
+          solved.lens.innovation_by_lens,
+          frame_.error,
+          variance_by(calibration_.of_frame(), sensitivity)};
 }
 
 OeMode::Solution OeMode::solve_about(const FrameMotion<double>& motion,
@@ -207,6 +239,9 @@ OeStatus OeMode::answer_without_landmarks(const PredictedMotion& predicted,
                  solution.status == SolveStatus::kTooFew && has_telemetry && !new_view);
   if (!has_telemetry) return finish(OeStatus::kNoPrediction);
   if (!contradiction) return finish(OeStatus::kTooFew);
+  if (frame_.telemetry == FrameTelemetry::kEnclosed && !lens_is_learnt()) {
+    offset_.note_contradiction(frame_.time_s, innovation_of(predicted, solution.solved));
+  }
   // One of the two is wrong, and it is unknown which: the answer must cover both.
   MotionCovariance covering = out->motion_covariance;
   covering.topLeftCorner<2, 2>() +=
@@ -272,12 +307,7 @@ OeStatus OeMode::answer_with_landmarks(const PredictedMotion& predicted, const S
   note_landmarks_answer(solved, added);
   if (enclosed) {
     // A contradiction does not get here: see solve_orientation().
-    static_cast<void>(offset_.learn(
-        frame_.time_s,
-        {solved.innovation, solved.innovation_covariance, solved.shared_covariance,
-         solved.zoom.innovation_by_calibration,
-         predicted.prior.telemetry_sensitivity.topRows<2>() - solved.sensitivity.topRows<2>(),
-         solved.lens.innovation_by_lens}));
+    static_cast<void>(offset_.learn(frame_.time_s, innovation_of(predicted, solved)));
   }
   if (lens_is_learnt()) {
     offset_.learn_scale(frame_.time_s, solved.lens.measured, solved.lens.information,

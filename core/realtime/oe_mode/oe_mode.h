@@ -182,6 +182,9 @@ class OeMode {
   void begin_frame(const ImageView& image, double frame_time_s,
                    const InterpolatedPanTilt* telemetry);
   OeStatus finish(OeStatus status) { return statistics_.status = status; }
+  [[nodiscard]] PredictedMotion by_telemetry(const InterpolatedPanTilt& telemetry);
+  [[nodiscard]] OffsetInnovation innovation_of(const PredictedMotion& predicted,
+                                               const SolvedMotion& solved) const;
   [[nodiscard]] Solution solve_about(const FrameMotion<double>& motion,
                                      const PredictedMotion& predicted);
   [[nodiscard]] Solution find_and_solve(const PredictedMotion& predicted,

@@ -97,7 +97,7 @@ void OeMode::begin_map() {
                          frame_.motion.angle.tilt + before.value.y()};
   frame_.sensitivity.topRows<2>() += before.sensitivity;
   const bool enclosed = frame_.telemetry == FrameTelemetry::kEnclosed;
-  offset_.begin(frame_.time_s, frame_.covariance.topLeftCorner<2, 2>(), !enclosed);
+  offset_.begin(frame_.time_s, frame_.covariance.topLeftCorner<2, 2>(), !enclosed, frame_.error);
   if (frame_.telemetry == FrameTelemetry::kExtrapolated) {
     add_pending(frame_.motion.angle.vector(), Matrix2<double>::Zero(), Matrix2<double>::Zero(),
                 Matrix2<double>::Zero(), frame_.sensitivity.topRows<2>());
@@ -128,7 +128,12 @@ bool OeMode::pending(double newest_sample_s, TelemetryLookUp* look_up) const {
 }
 
 void OeMode::settle_pending(const InterpolatedPanTilt* late) {
-  offset_.settle_oldest(calibration_.of_frame(), late);
+  InterpolatedPanTilt widened;
+  if (late != nullptr) {
+    widened = *late;
+    offset_.widen(calibration_.of_frame(), &widened);
+  }
+  offset_.settle_oldest(calibration_.of_frame(), late != nullptr ? &widened : nullptr);
 }
 
 void OeMode::forget_pending() { offset_.forget_pending(); }

@@ -145,7 +145,9 @@ bool agree_with_telemetry(const Given& given, const FromLandmarks& landmarks,
   out->innovation = given.scaled.telemetry.head<2>() - own.x.head<2>();
   out->innovation_covariance =
       telemetry_covariance.topLeftCorner<2, 2>() + own.covariance.topLeftCorner<2, 2>();
+  out->innovation_covariance.diagonal() -= prior.error_variance + prior.repeated_variance;
   Matrix2<double> expected = out->innovation_covariance + landmarks.prior_offset;
+  expected.diagonal() += prior.error_variance;
   Vector2<double> unexpected = out->innovation;
   if (prior.lens != nullptr) expect_of_lens(*prior.lens, own, &unexpected, &expected);
   if (given.problem.zooms()) {

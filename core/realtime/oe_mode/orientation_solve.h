@@ -43,6 +43,10 @@ struct MotionPrior {
   Vector4<double> telemetry =
       Vector4<double>::Zero();  // measured minus (predicted + offset), true units
   Matrix4<double> telemetry_covariance = Matrix4<double>::Zero();
+  // rad^2, parts of telemetry_covariance: of an error that goes with the angle, and for what was
+  // said of it before. The innovation's covariance has neither.
+  Vector2<double> error_variance = Vector2<double>::Zero();
+  Vector2<double> repeated_variance = Vector2<double>::Zero();
   Sensitivity<4> telemetry_sensitivity = Sensitivity<4>::Zero();
   // rad^2, of g, before this frame.
   Matrix2<double> offset_covariance = Matrix2<double>::Zero();

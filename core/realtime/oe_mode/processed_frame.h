@@ -8,6 +8,7 @@
 #include "core/realtime/image/image_view.h"
 #include "core/realtime/lens/own_lens.h"
 #include "core/realtime/oe_mode/covariance.h"
+#include "core/realtime/oe_mode/offset_cells.h"
 
 namespace alidade {
 
@@ -34,6 +35,7 @@ struct ProcessedFrame {
   FrameTelemetry telemetry = FrameTelemetry::kNone;
   double look_up_time_s = 0;  // s, telemetry clock; the time asked for
   double look_up_sigma_s = 0;
+  AngleError error;            // of that telemetry
   FrameMotion<double> motion;  // map's frame, about the middle row; with the solved zoom_rate
   Matrix6 covariance = Matrix6::Zero();  // of motion, from the frame's own noise
   Matrix2<double> shared_covariance =

@@ -239,11 +239,13 @@ bool interpolate(const TelemetryNoise& noise, const TelemetryKnot* knots, int co
   // the rate is 0.
   covariance.diagonal().head<2>() +=
       0.75 * shared_time_variance * shared_time_variance * acceleration_square;
+  Vector2<double> rounding = Vector2<double>::Zero();  // rad^2
   for (int axis = 0; axis < 2; ++axis) {
     // If an axis moves less than a step, all its samples are rounded alike, and averaging does not
     // help.
     if (std::abs(rate[axis]) * span_s < noise.resolution) {
-      covariance(axis, axis) += noise.resolution * noise.resolution / 12;
+      rounding[axis] = noise.resolution * noise.resolution / 12;
+      covariance(axis, axis) += rounding[axis];
     }
   }
   // Samples at almost the same time give any rate, and angles so far that rounding leaves nothing
@@ -271,8 +273,14 @@ bool interpolate(const TelemetryNoise& noise, const TelemetryKnot* knots, int co
     const double white = by_angle(0, 0) * variance;
     const double lasting = shared_time_variance * rate[axis] * rate[axis] +
                            effect[0] * effect[0] * acceleration_square[axis];
-    out->correlation_time_s = std::max(
-        out->correlation_time_s, (white * white_time_s + lasting * kLasting) / (white + lasting));
+    // As long as the angle stays within the step.
+    constexpr double kLongest = 100;  // s
+    const double in_step_s =
+        noise.resolution / std::max(std::abs(rate[axis]), noise.resolution / kLongest);
+    const double all = white + lasting + rounding[axis];
+    const double sum = white * white_time_s + lasting * kLasting +
+                       (rounding[axis] > 0 ? rounding[axis] * in_step_s : 0);
+    out->correlation_time_s = std::max(out->correlation_time_s, sum / all);
   }
   return true;
 }

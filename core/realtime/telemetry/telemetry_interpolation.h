@@ -45,6 +45,10 @@ struct InterpolatedPanTilt {
   PanTilt<double> rate;     // rad/s, measured units
   // Order: pan, tilt, pan rate, tilt rate.
   Matrix4<double> covariance = Matrix4<double>::Zero();
+  // rad^2, rad: the part of `covariance` that goes with the angle (telemetry_error.h), and its
+  // correlation length. 0: no such part is known.
+  Vector2<double> error_variance = Vector2<double>::Zero();
+  Vector2<double> error_length = Vector2<double>::Zero();
   // (rad/s^2)^2, expected square of the acceleration (pan, tilt) near this time.
   Vector2<double> acceleration_square = Vector2<double>::Zero();
   // rad/s^2, the acceleration itself, if known.
