@@ -1,6 +1,7 @@
 #include "core/calibration/calibration_types.h"
 
 #include <cmath>
+#include <cstdio>
 
 namespace alidade {
 
@@ -87,6 +88,25 @@ std::vector<std::string> CalibrationExclusions::describe() const {
   add(telemetry_duplicate, "telemetry samples that repeat a sequence number or stamp");
   add(telemetry_outliers, "telemetry samples that are outliers");
   add(telemetry_unused, "telemetry samples before or after the video");
+  return lines;
+}
+
+std::vector<std::string> CalibrationQuality::describe_departures() const {
+  std::vector<std::string> lines;
+  const auto number = [](double x) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.2g", x);
+    return std::string(text);
+  };
+  if (contradiction) {
+    lines.push_back("different " + contradiction->between + " disagree in " +
+                    contradiction->parameter + ", by " + number(contradiction->scatter) +
+                    " times what noise explains; sigmas have grown to that");
+  }
+  for (const CalibrationCause& c : causes) {
+    lines.push_back((&c == &causes.front() ? "likeliest cause: " : "beside it: ") + c.cause + ", " +
+                    number(c.size) + " " + c.unit + "; the sigmas have what it does");
+  }
   return lines;
 }
 

@@ -192,6 +192,16 @@ struct CalibrationContradiction {
   double scatter = 1;   // of the parts' values, where 1 is what their noise makes it
 };
 
+// A departure from the model that the residuals show beyond chance. The sigmas have what it does to
+// the parameters.
+struct CalibrationCause {
+  std::string cause;  // "play of pan"
+  double chi_square = 0;
+  double freedom = 0;
+  double size = 0;  // root mean square
+  std::string unit;
+};
+
 struct CalibrationQuality {
   double pixel_sigma_ratio = 0;      // residual / stated noise, redundancy accounted for
   double telemetry_sigma_ratio = 0;  // likewise
@@ -213,6 +223,10 @@ struct CalibrationQuality {
   bool weak_in_time = false;
   std::vector<std::string> advice;  // what motion or knowledge would help; also with kOk
   std::optional<CalibrationContradiction> contradiction;  // the worst
+  std::vector<CalibrationCause> causes;                   // the likeliest first
+
+  // What contradicts the model and what may be the cause, a line each.
+  [[nodiscard]] std::vector<std::string> describe_departures() const;
 };
 
 struct CalibrationResult {

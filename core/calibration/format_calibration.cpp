@@ -47,6 +47,23 @@ void write_quality(const CalibrationNotes& notes, YAML::Emitter* out) {
          << exact_text(prior.sigma) << YAML::EndMap;
   }
   *out << YAML::EndMap;
+  if (quality.contradiction) {
+    *out << YAML::Key << "contradiction" << YAML::Value << YAML::Flow << YAML::BeginMap << YAML::Key
+         << "parameter" << YAML::Value << quality.contradiction->parameter << YAML::Key << "between"
+         << YAML::Value << quality.contradiction->between << YAML::Key << "scatter" << YAML::Value
+         << short_text(quality.contradiction->scatter) << YAML::EndMap;
+  }
+  if (!quality.causes.empty()) {
+    *out << YAML::Key << "causes" << YAML::Value << YAML::BeginSeq;
+    for (const CalibrationCause& cause : quality.causes) {
+      *out << YAML::Flow << YAML::BeginMap << YAML::Key << "cause" << YAML::Value << cause.cause
+           << YAML::Key << "chi_square" << YAML::Value << short_text(cause.chi_square) << YAML::Key
+           << "freedom" << YAML::Value << short_text(cause.freedom) << YAML::Key << "size"
+           << YAML::Value << short_text(cause.size) << YAML::Key << "unit" << YAML::Value
+           << cause.unit << YAML::EndMap;
+    }
+    *out << YAML::EndSeq;
+  }
   texts("excluded", notes.excluded);
   texts("advice", quality.advice);
   *out << YAML::EndMap;

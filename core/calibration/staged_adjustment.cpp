@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/calibration/contradictions.h"
+#include "core/calibration/departures.h"
 #include "core/calibration/knot_choice.h"
 #include "core/calibration/noise_check.h"
 #include "core/calibration/rounded_telemetry.h"
@@ -195,6 +196,9 @@ void StagedAdjustment::allow_for_contradictions(CalibrationQuality* quality) {
   const ContradictionCheck check =
       check_contradictions(usual_divisions(adjusted_.state.trajectory, times.front(), times.back()),
                            adjustment_, adjusted_.state, adjusted_.at, factor);
+  const Departures departures = find_departures(adjustment_, adjusted_.state, adjusted_.at, factor);
+  quality->causes = departures.causes;
+  adjusted_.covariance += departures.error;
   const auto first_global = adjusted_.at.H.rows() - kGlobalCount;
   // What landmarks and frames have in common is part of what parts show.
   GlobalVector root = GlobalVector::Ones();

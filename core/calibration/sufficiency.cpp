@@ -26,7 +26,9 @@ constexpr double kMinRateVariation = 0.05;     // of the largest rate
 constexpr double kMaxFieldOfViewRatio = 0.2;   // least focal length / width: 136 deg
 constexpr double kMaxFocalLengthError = 0.05;  // relative
 constexpr double kMaxClockOffsetError_s = 0.01;
-constexpr double kMaxReadoutError_s = 5e-3;   // from the first to the last row
+constexpr double kMaxReadoutError_s = 5e-3;  // from the first to the last row
+// Of parts of the recording, in units of what noise explains, where no cause shows.
+constexpr double kMaxScatter = 30;
 constexpr double kMaxDistortionError = 0.02;  // of the distance from the centre, in the corner
 
 std::string text(const char* format, double a, double b = 0) {
@@ -279,6 +281,15 @@ void judge(const CalibrationOptions& options, const MotionExtent& motion,
           " is known from its prior only: a larger range of the other axis would determine it");
     }
   }
+  const auto& contradiction = result->quality.contradiction;
+  if (contradiction && contradiction->scatter > kMaxScatter && result->quality.causes.empty()) {
+    reasons.push_back(
+        contradiction->parameter +
+        text(" differs between parts of the recording by %.0f times what noise explains, and no "
+             "known departure from the model shows: film again, without what moves, haze or a "
+             "change of the lens",
+             contradiction->scatter));
+  }
   result->quality.weak_in_time =
       d_error > kMaxClockOffsetError_s || readout_error > kMaxReadoutError_s;
   if (reasons.empty()) {
@@ -287,6 +298,9 @@ void judge(const CalibrationOptions& options, const MotionExtent& motion,
         "focal length " +
         estimate_text(c.camera.focal_length, parameter_sigma(c, Parameter::kFocalLength), "px") +
         ", clock offset " + estimate_text(1e3 * c.clock_offset, 1e3 * d_error, "ms");
+    for (const std::string& line : result->quality.describe_departures()) {
+      result->message += "; " + line;
+    }
     return;
   }
   result->status = CalibrationStatus::kWeak;

@@ -111,6 +111,9 @@ std::string summary_text(const CalibrationResult& result, const CalibrationOptio
   for (const std::string& line : result.exclusions.describe()) text += "left out: " + line + "\n";
   text +=
       fmt::format("weakest: {} (condition {:.3g})\n", quality.weakest_direction, quality.condition);
+  for (const std::string& line : quality.describe_departures()) {
+    text += "contradicts the model: " + line + "\n";
+  }
   for (const std::string& line : quality.advice) text += "advice: " + line + "\n";
   return text;
 }
@@ -137,6 +140,19 @@ std::string summary_json(const CalibrationResult& result, const CalibrationOptio
                      {"condition", quality.condition},
                      {"weakest_direction", quality.weakest_direction},
                      {"advice", quality.advice}};
+  if (quality.contradiction) {
+    json["quality"]["contradiction"] = {{"parameter", quality.contradiction->parameter},
+                                        {"between", quality.contradiction->between},
+                                        {"scatter", quality.contradiction->scatter}};
+  }
+  json["quality"]["causes"] = ordered_json::array();
+  for (const CalibrationCause& cause : quality.causes) {
+    json["quality"]["causes"].push_back({{"cause", cause.cause},
+                                         {"chi_square", cause.chi_square},
+                                         {"freedom", cause.freedom},
+                                         {"size", cause.size},
+                                         {"unit", cause.unit}});
+  }
   json["excluded"] = result.exclusions.describe();
   json["files"] = ordered_json::object();
   for (const auto& [kind, path] : files) json["files"][kind] = path;

@@ -187,6 +187,9 @@ void SelfCalibration::publish(const CheckedCalibration& checked) {
                   "in frames held out; map of {} landmarks",
                   quality.frames, quality.landmarks, describe(fresh->calibration),
                   quality.pixel_sigma_ratio, checked.hold_out, fresh->map.landmarks.size()));
+  for (const std::string& line : quality.describe_departures()) {
+    messages_.say("what was filmed contradicts the model: " + line);
+  }
   for (const std::string& remark : checked.remarks) messages_.say(remark);
   store(checked.result, fresh->map);
   publication_.accept([this](double zoom) { return zoom_.fits(zoom); });

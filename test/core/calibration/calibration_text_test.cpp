@@ -438,6 +438,8 @@ TEST(CalibrationText, TellsPeopleOfTheRunAndReadsBackWithoutIt) {
   notes.quality->landmarks = 567;
   notes.quality->weakest_direction = "focal_length up: with \"pan_scale\" up";
   notes.quality->advice = {"turn: a whole circle", "#2"};
+  notes.quality->contradiction = {"clock_offset", "runs of pan", 3.5};
+  notes.quality->causes = {{"play", 270, 2, 0.25, "mrad"}};
   notes.excluded = {"2 observations that are outliers"};
   notes.priors = {{"aspect", {1, 0}}, {"pan_scale", {1, 1e-8}}};
   notes.landmarks = "map.bin";
@@ -445,6 +447,8 @@ TEST(CalibrationText, TellsPeopleOfTheRunAndReadsBackWithoutIt) {
   for (const char* part :
        {"quality:", "pixel_sigma_ratio: 1.25", "landmarks: 567",
         "pan_scale: {value: 1, sigma: 1e-08}", "\"2 observations that are outliers\"", "\"#2\"",
+        "contradiction: {parameter: clock_offset, between: runs of pan, scatter: 3.5}",
+        "{cause: play, chi_square: 270, freedom: 2, size: 0.25, unit: mrad}",
         "landmarks: \"map.bin\""}) {
     EXPECT_THAT(text, HasSubstr(part));
   }

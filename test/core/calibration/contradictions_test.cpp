@@ -13,10 +13,10 @@ namespace alidade::internal {
 namespace {
 
 constexpr int kParts = 8;
-constexpr int kRuns = 150;
+constexpr int kRecordings = 150;
 
 // Weak priors, so that the data decide.
-test::AdjustmentScene make_scene() {
+test::AdjustmentScene scene_of_parts() {
   test::AdjustmentScene scene = test::make_adjustment_scene();
   scene.priors.information.setConstant(1);
   scene.priors.information.segment<2>(index(Parameter::kCentreU)).setConstant(1e-4);
@@ -27,7 +27,7 @@ int part_at(double time_s) {
   return std::clamp(static_cast<int>(time_s / 2 * kParts), 0, kParts - 1);
 }
 
-struct Statistics {
+struct PartStatistics {
   GlobalVector squares = GlobalVector::Zero();  // error^2 / variance, mean
   GlobalVector grown = GlobalVector::Zero();    // with the variance that parts show
   GlobalVector ratio = GlobalVector::Zero();    // mean
@@ -37,13 +37,13 @@ struct Statistics {
 };
 
 // common: sigmas, of an error that pan's telemetry has in all of a part.
-Statistics run_many(double common) {
-  const test::AdjustmentScene scene = make_scene();
+PartStatistics scatter_of(double common) {
+  const test::AdjustmentScene scene = scene_of_parts();
   const std::vector<Division> divisions = {{"parts", kParts, part_at}};
   std::mt19937_64 random(11);
   std::normal_distribution<double> noise;
-  Statistics mean;
-  for (int run = 0; run < kRuns; ++run) {
+  PartStatistics mean;
+  for (int run = 0; run < kRecordings; ++run) {
     AdjustmentData data = scene.data;
     for (auto& o : data.observations)
       o.u += o.sigma * Vector2<double>(noise(random), noise(random));
@@ -80,11 +80,11 @@ Statistics run_many(double common) {
     for (int p = 0; p < kGlobalCount; ++p) {
       const PartGrowth& of_p = growth[static_cast<std::size_t>(p)];
       const double square = step[p] * step[p] / covariance(p, p);
-      mean.squares[p] += square / kRuns;
-      mean.grown[p] += square / (1 + of_p.share * (std::max(of_p.ratio, 1.0) - 1)) / kRuns;
-      mean.ratio[p] += of_p.ratio / kRuns;
-      mean.freedom[p] += of_p.freedom / kRuns;
-      mean.share[p] += of_p.share / kRuns;
+      mean.squares[p] += square / kRecordings;
+      mean.grown[p] += square / (1 + of_p.share * (std::max(of_p.ratio, 1.0) - 1)) / kRecordings;
+      mean.ratio[p] += of_p.ratio / kRecordings;
+      mean.freedom[p] += of_p.freedom / kRecordings;
+      mean.share[p] += of_p.share / kRecordings;
     }
   }
   return mean;
@@ -92,10 +92,10 @@ Statistics run_many(double common) {
 
 // The leverage is exact, so the mean ratio is 1; its variance is 2 / (freedom runs).
 TEST(Contradictions, PartsWithWhiteErrorsScatterAsTheyShould) {
-  const Statistics mean = run_many(0);
+  const PartStatistics mean = scatter_of(0);
   for (int p = 0; p < kGlobalCount; ++p) {
     if (mean.freedom[p] < 1) continue;
-    EXPECT_NEAR(mean.ratio[p], 1, 4.5 * std::sqrt(2 / (mean.freedom[p] * kRuns))) << p;
+    EXPECT_NEAR(mean.ratio[p], 1, 4.5 * std::sqrt(2 / (mean.freedom[p] * kRecordings))) << p;
   }
   // 1 % each: more than 7 of 150 come once in 3000.
   EXPECT_LE(mean.contradictions, 7);
@@ -104,15 +104,15 @@ TEST(Contradictions, PartsWithWhiteErrorsScatterAsTheyShould) {
 // What pan's telemetry has in common in a part moves pan's scale more than white errors do.
 TEST(Contradictions, ErrorsInCommonMakeTheSigmaGrow) {
   const int beta = index(Parameter::kPanScale);
-  const Statistics mean = run_many(10);
-  const double chance = 4.5 * std::sqrt(2.0 / kRuns);
+  const PartStatistics mean = scatter_of(10);
+  const double chance = 4.5 * std::sqrt(2.0 / kRecordings);
   EXPECT_GT(mean.squares[beta], 10);
   // Scale, zero, clock offset, drift and an axis absorb five of the eight parts' errors at most: a
   // part of 3 / 8 is left to scatter. The mean of 1 / ratio is n / (n - 2).
   const double n = mean.freedom[beta];
   ASSERT_GT(n, 3);
   EXPECT_LT(mean.grown[beta], (1 + chance) * 8 / 3 * n / (n - 2));
-  EXPECT_GT(mean.contradictions, kRuns / 2);
+  EXPECT_GT(mean.contradictions, kRecordings / 2);
 }
 
 TEST(Contradictions, UsualDivisionsCoverTheTimeAndBothAxes) {

@@ -11,7 +11,7 @@ namespace alidade::internal {
 namespace {
 
 // Weak priors, so that the data decide.
-test::AdjustmentScene make_scene() {
+test::AdjustmentScene scene_with_known_centre() {
   test::AdjustmentScene scene = test::make_adjustment_scene();
   scene.priors.information.setConstant(1);
   scene.fixed[static_cast<std::size_t>(index(Parameter::kCentreU))] = true;
@@ -34,7 +34,7 @@ struct Planted {
 
 // Column 0: telemetry, column 1: pictures.
 Planted plant(const Vector2<double>& theta) {
-  const test::AdjustmentScene scene = make_scene();
+  const test::AdjustmentScene scene = scene_with_known_centre();
   AdjustmentData data = scene.data;
   for (auto& sample : data.telemetry) sample.measured[0] += theta[0] * of_telemetry(sample.time_s);
   for (auto& o : data.observations) o.u += theta[1] * of_picture(o.u);
@@ -71,7 +71,7 @@ Planted plant(const Vector2<double>& theta) {
 }
 
 TEST(DepartureScore, FindsWhatIsPlanted) {
-  for (const Vector2<double> theta :
+  for (const Vector2<double>& theta :
        {Vector2<double>(1, 0), Vector2<double>(0, 1), Vector2<double>(-2, 3)}) {
     const Planted planted = plant(theta);
     const Vector2<double> found = planted.score.information().ldlt().solve(planted.score.score());

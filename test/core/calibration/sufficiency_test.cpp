@@ -97,6 +97,22 @@ TEST(Judge, SaysOfAnAxisThatOnlyItsPriorHoldsIt) {
   }
 }
 
+// A cause that is known is in the sigmas.
+TEST(Judge, RefusesPartsThatContradictEachOtherWithoutACause) {
+  for (const double scatter : {29.0, 31.0}) {
+    CalibrationResult result = good_result();
+    result.quality.contradiction = {"clock_offset", "runs of pan", scatter};
+    judge({}, kMotion, &result);
+    EXPECT_EQ(result.status, scatter > 30 ? CalibrationStatus::kWeak : CalibrationStatus::kOk);
+    EXPECT_THAT(result.message, HasSubstr("clock_offset"));
+    result.message.clear();
+    result.quality.causes = {{"play", 300, 2, 0.3, "mrad"}};
+    judge({}, kMotion, &result);
+    EXPECT_EQ(result.status, CalibrationStatus::kOk);
+    EXPECT_THAT(result.message, HasSubstr("likeliest cause: play, 0.3 mrad"));
+  }
+}
+
 // The file of such a calibration could not be read.
 TEST(Judge, RefusesAnAxisThatComesOutTurnedOver) {
   CalibrationResult result = good_result();
