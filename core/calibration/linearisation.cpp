@@ -122,6 +122,16 @@ Camera<double> AdjustmentState::physical_camera() const {
   return physical;
 }
 
+TelemetryJacobian telemetry_jacobian(const Mechanics<double>& mechanics,
+                                     const AdjustmentTelemetry& sample, double since_reference_s,
+                                     const Vector2<double>& angle, const Vector2<double>& rate) {
+  const Vector2<double> scale(mechanics.pan_scale, mechanics.tilt_scale);
+  TelemetryJacobian J;
+  J << angle[0], 0, -scale[0] * rate[0], scale[0] * rate[0] * since_reference_s,  //
+      0, angle[1], -scale[1] * rate[1], scale[1] * rate[1] * since_reference_s;
+  return sample.sigma.cwiseInverse().asDiagonal() * J;
+}
+
 void apply_step(const Eigen::VectorXd& x, const std::vector<Vector2<double>>& x_landmark,
                 AdjustmentState* state) {
   const int control_points = state->trajectory.control_points();
@@ -320,11 +330,8 @@ void Lineariser::add_telemetry(const AdjustmentState& state, const LossScales& l
     if (!sample.used) continue;
     out->cost += robust.cost;
 
-    // Columns pan scale, tilt scale, shift, drift.
-    Eigen::Matrix<double, 2, 4> J;
-    J << angle[0], 0, -scale[0] * rate[0], scale[0] * rate[0] * since_reference,  //
-        0, angle[1], -scale[1] * rate[1], scale[1] * rate[1] * since_reference;
-    J = (sample.sigma.cwiseInverse().asDiagonal() * J).eval();
+    const TelemetryJacobian J =
+        telemetry_jacobian(state.mechanics, sample, since_reference, angle, rate);
     const Matrix2<double> J_squared =
         robust.weight * Matrix2<double>(slope.cwiseAbs2().asDiagonal());
     add_control_points(basis, J_squared, &H);

@@ -122,6 +122,15 @@ using GlobalRows = Eigen::Matrix<double, kGlobalCount, Eigen::Dynamic>;
 // Change of the parameters with the error of one observation, in units of its sigma.
 using Influence = Eigen::Matrix<double, kGlobalCount, 2>;
 
+// d (prediction of a telemetry sample, in units of its sigma) / d (pan scale, tilt scale, shift,
+// drift), which are the last parameters.
+using TelemetryJacobian = Eigen::Matrix<double, 2, kGlobalCount - kObservedCount>;
+[[nodiscard]] TelemetryJacobian telemetry_jacobian(const Mechanics<double>& mechanics,
+                                                   const AdjustmentTelemetry& sample,
+                                                   double since_reference_s,
+                                                   const Vector2<double>& angle,
+                                                   const Vector2<double>& rate);
+
 void apply_step(const Eigen::VectorXd& x, const std::vector<Vector2<double>>& x_landmark,
                 AdjustmentState* state);
 
