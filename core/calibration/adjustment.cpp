@@ -42,6 +42,20 @@ bool solve_iteratively(const Linearisation& in, double damping, Eigen::VectorXd*
          x->allFinite();
 }
 
+bool solve_columns_iteratively(const Linearisation& in, const Eigen::MatrixXd& b,
+                               Eigen::MatrixXd* x, Eigen::VectorXd* step) {
+  constexpr double kTolerance = 1e-6;
+  ReducedEquations equations;
+  if (!equations.set(in, 0) || !equations.solve(equations.g(), kTolerance, step)) return false;
+  x->resize(b.rows(), b.cols());
+  Eigen::VectorXd column;
+  for (Eigen::Index i = 0; i < b.cols(); ++i) {
+    if (!equations.solve(b.col(i), kTolerance, &column)) return false;
+    x->col(i) = column;
+  }
+  return x->allFinite() && step->allFinite();
+}
+
 }  // namespace
 
 bool ReducedFactor::set(Eigen::MatrixXd S) {
@@ -92,6 +106,20 @@ bool Adjustment::solve_directly(const Linearisation& in, double damping, Eigen::
   if (llt.info() != Eigen::Success) return false;
   *x = scale.cwiseProduct(llt.solve(scale.cwiseProduct(reduced_g_)));
   return x->allFinite();
+}
+
+bool Adjustment::solve_columns(const Linearisation& in, const Eigen::MatrixXd& b,
+                               Eigen::MatrixXd* x, Eigen::VectorXd* step) {
+  if (is_long(in) && solve_columns_iteratively(in, b, x, step)) return true;
+  if (!reduce(in, 0)) return false;
+  const Eigen::VectorXd scale = reduced_.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  reduced_ = scale.asDiagonal() * reduced_ * scale.asDiagonal();
+  const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>, Eigen::Lower> llt(reduced_);
+  if (llt.info() != Eigen::Success) return false;
+  *x = scale.asDiagonal() * llt.solve(scale.asDiagonal() * b);
+  *step = scale.cwiseProduct(llt.solve(scale.cwiseProduct(reduced_g_)));
+  forget_reduced();
+  return x->allFinite() && step->allFinite();
 }
 
 bool Adjustment::solve(const Linearisation& in, double damping, Eigen::VectorXd* x,

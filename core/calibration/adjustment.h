@@ -48,6 +48,11 @@ class Adjustment {
   [[nodiscard]] bool solve(const Linearisation& linearisation, double damping, Eigen::VectorXd* x,
                            std::vector<Vector2<double>>* x_landmark);
 
+  // Solves H x = b, landmarks eliminated, for each column of b. *step: that for the gradient, which
+  // is what is left to go to the minimum. False if H is not positive definite.
+  [[nodiscard]] bool solve_columns(const Linearisation& linearisation, const Eigen::MatrixXd& b,
+                                   Eigen::MatrixXd* x, Eigen::VectorXd* step);
+
   // Levenberg-Marquardt until a step promises to reduce the cost by less than `tolerance` (a change
   // of sqrt(tolerance) standard deviations). *at: the linearisation at the final state. False if no
   // step helps although one should, or after max_steps.

@@ -68,7 +68,7 @@ StageStatus run(const CalibrationInput& input, const CalibrationOptions& options
   status = report(options, 0.3, "robust adjustment");
   if (!status.ok()) return status;
 
-  internal::StagedAdjustment adjustment(start, motion.noise, options.max_knots, &selected);
+  internal::StagedAdjustment adjustment(start, motion.noise, options, &selected);
   adjustment.adjust_robustly();
   status = report(options, 0.7, "adjustment");
   if (!status.ok()) return status;

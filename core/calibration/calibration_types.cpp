@@ -30,6 +30,8 @@ bool CalibrationOptions::validate(std::string* error) const {
   if (!centre_offset_px.allFinite() || !(centre_sigma_px >= 0) || std::isinf(centre_sigma_px))
     problem = "the prior of the optical centre needs finite px, sigma >= 0";
   if (!(axis_sigma_rad >= 0)) problem = "axis_sigma_rad must not be negative";
+  if (!(angle_accuracy_rad >= 0) || std::isinf(angle_accuracy_rad))
+    problem = "angle_accuracy_rad must not be negative";
   if (!(clock_offset_search_s > 0)) problem = "clock_offset_search_s must be positive";
   if (!(first_knot_spacing_s > 0)) problem = "first_knot_spacing_s must be positive";
   if (problem != nullptr && error != nullptr) *error = problem;

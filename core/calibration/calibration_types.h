@@ -11,6 +11,7 @@
 
 #include "core/calibration/trajectory_spline.h"
 #include "core/model/calibration.h"
+#include "core/model/telemetry_error.h"
 
 namespace alidade {
 
@@ -86,6 +87,10 @@ struct CalibrationOptions {
   Vector3<double> pan_axis = Vector3<double>::UnitZ();
   Vector3<double> tilt_axis = Vector3<double>::UnitY();
   double axis_sigma_rad = 0.05;  // each tangent component
+  // The maker's claim of each axis's angles: standard deviation of errors that turn as slowly as the
+  // visited range, which no recording shows: they are a scale. 0: no claim; the scales' priors then
+  // hold as they are.
+  double angle_accuracy_rad = 0;
 
   StampNoise image_stamps = StampNoise::kSymmetric;
   StampNoise telemetry_stamps = StampNoise::kSymmetric;
@@ -233,6 +238,9 @@ struct CalibrationResult {
   CalibrationStatus status = CalibrationStatus::kBadInput;
   std::string message;      // what is wrong and what would help; with kOk a summary
   Calibration calibration;  // meaningful with kOk and, for diagnosis, kWeak
+  // What the telemetry reads beside the scaled angle, where the data show it. The calibration and its
+  // covariance allow for it.
+  TelemetryError telemetry_error;
   StreamTiming image_timing;
   StreamTiming telemetry_timing;
   TrajectorySpline trajectory;  // image clock

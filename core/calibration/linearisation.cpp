@@ -96,18 +96,6 @@ struct ObservationModel {
   }
 };
 
-// Of a sample in units of sigma, by pan scale, tilt scale, shift, drift.
-Eigen::Matrix<double, 2, 4> telemetry_jacobian(const AdjustmentTelemetry& sample,
-                                               const Vector2<double>& scale,
-                                               const Vector2<double>& angle,
-                                               const Vector2<double>& rate,
-                                               double since_reference) {
-  Eigen::Matrix<double, 2, 4> J;
-  J << angle[0], 0, -scale[0] * rate[0], scale[0] * rate[0] * since_reference,  //
-      0, angle[1], -scale[1] * rate[1], scale[1] * rate[1] * since_reference;
-  return sample.sigma.cwiseInverse().asDiagonal() * J;
-}
-
 struct RobustCost {
   double cost;
   double weight;
@@ -139,6 +127,16 @@ Camera<double> AdjustmentState::physical_camera() const {
   Camera<double> physical = camera;
   set_corner_distortion(corner_distortion, &physical);
   return physical;
+}
+
+TelemetryJacobian telemetry_jacobian(const Mechanics<double>& mechanics,
+                                     const AdjustmentTelemetry& sample, double since_reference_s,
+                                     const Vector2<double>& angle, const Vector2<double>& rate) {
+  const Vector2<double> scale(mechanics.pan_scale, mechanics.tilt_scale);
+  TelemetryJacobian J;
+  J << angle[0], 0, -scale[0] * rate[0], scale[0] * rate[0] * since_reference_s,  //
+      0, angle[1], -scale[1] * rate[1], scale[1] * rate[1] * since_reference_s;
+  return sample.sigma.cwiseInverse().asDiagonal() * J;
 }
 
 void apply_step(const Eigen::VectorXd& x, const std::vector<Vector2<double>>& x_landmark,
@@ -346,9 +344,9 @@ void Lineariser::visit(const AdjustmentState& state, const Linearisation& at,
     row.basis = trajectory.basis(row.time_s, at.telemetry[i].segment);
     row.error = at.telemetry[i].error;
     row.slope = scale.cwiseQuotient(sample.sigma);
-    row.J =
-        telemetry_jacobian(sample, scale, trajectory.position(row.basis).vector(),
-                           trajectory.rate(row.basis).vector(), sample.time_s - data_.reference_s);
+    row.J = telemetry_jacobian(state.mechanics, sample, sample.time_s - data_.reference_s,
+                               trajectory.position(row.basis).vector(),
+                               trajectory.rate(row.basis).vector());
     row.sigma = sample.sigma;
     row.is_noise = sample.is_noise;
     telemetry(row);
@@ -383,8 +381,8 @@ void Lineariser::add_telemetry(const AdjustmentState& state, const LossScales& l
     if (!sample.used) continue;
     out->cost += robust.cost;
 
-    const Eigen::Matrix<double, 2, 4> J =
-        telemetry_jacobian(sample, scale, angle, rate, since_reference);
+    const TelemetryJacobian J =
+        telemetry_jacobian(state.mechanics, sample, since_reference, angle, rate);
     const Matrix2<double> J_squared =
         robust.weight * Matrix2<double>(slope.cwiseAbs2().asDiagonal());
     add_control_points(basis, J_squared, &H);

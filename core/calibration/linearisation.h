@@ -123,6 +123,15 @@ using GlobalRows = Eigen::Matrix<double, kGlobalCount, Eigen::Dynamic>;
 // Change of the parameters with the error of one observation, in units of its sigma.
 using Influence = Eigen::Matrix<double, kGlobalCount, 2>;
 
+// d (prediction of a telemetry sample, in units of its sigma) / d (pan scale, tilt scale, shift,
+// drift), which are the last parameters.
+using TelemetryJacobian = Eigen::Matrix<double, 2, kGlobalCount - kObservedCount>;
+[[nodiscard]] TelemetryJacobian telemetry_jacobian(const Mechanics<double>& mechanics,
+                                                   const AdjustmentTelemetry& sample,
+                                                   double since_reference_s,
+                                                   const Vector2<double>& angle,
+                                                   const Vector2<double>& rate);
+
 // An observation in use at a state, with what departures from the model act on
 // (departure_score.h). Derivatives are of the projection, in units of sigma.
 struct ObservationRow {
@@ -146,8 +155,8 @@ struct TelemetryRow {
   double time_s = 0;
   TrajectorySpline::Basis basis;
   Vector2<double> error;
-  Vector2<double> slope;           // derivative by (pan, tilt), of either axis
-  Eigen::Matrix<double, 2, 4> J;   // by pan scale, tilt scale, shift, drift
+  Vector2<double> slope;  // derivative by (pan, tilt), of either axis
+  TelemetryJacobian J;
   Vector2<double> sigma;           // rad
   std::array<bool, 2> is_noise{};  // as in AdjustmentTelemetry
 };

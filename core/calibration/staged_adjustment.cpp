@@ -37,12 +37,14 @@ double median_error(const std::vector<LinearisedResidual>& residuals) {
 }  // namespace
 
 StagedAdjustment::StagedAdjustment(const StartValues& start, const TelemetryAngleNoise& noise,
-                                   int max_knots, SelectedInput* selected)
+                                   const CalibrationOptions& options, SelectedInput* selected)
     : selected_(selected),
       noise_(noise),
-      max_knots_(max_knots),
+      max_knots_(options.max_knots),
       doubt_(start.doubt),
-      adjustment_(selected->data, start.prior.priors, start.prior.fixed) {
+      adjustment_(selected->data, start.prior.priors, start.prior.fixed),
+      departures_(start.prior.fixed, noise.resolution_rad, options.angle_accuracy_rad) {
+  start_ = start.state;
   adjusted_.state = start.state;
 }
 
@@ -52,6 +54,7 @@ void StagedAdjustment::adjust_robustly() {
     replace_rounded_telemetry();
     settled_ = settle_robustly();
   }
+  settled_ = settle_departures() && settled_;
   adjustment_.linearise(adjusted_.state, {}, &adjusted_.at);
   mark_outliers();
 }
@@ -68,6 +71,10 @@ StageStatus StagedAdjustment::adjust_on_inliers(CalibrationQuality* quality) {
               "the data do not determine all parameters: move both axes, at changing speed, over a "
               "good part of the image"};
     }
+    if (departs_) {
+      converged = settle_known_departures();
+      if (!converged) break;
+    }
     if (!correct_noise(quality)) break;
   }
   quality->steps = adjustment_.steps_taken();
@@ -81,6 +88,10 @@ StageStatus StagedAdjustment::adjust_on_inliers(CalibrationQuality* quality) {
   if (!status.ok()) return status;
   allow_for_shared_errors();
   allow_for_contradictions(quality);
+  if (departs_) {
+    adjusted_.covariance += departures_.covariance();
+    adjusted_.telemetry_error = departures_.error();
+  }
   return {};
 }
 
@@ -104,6 +115,38 @@ bool StagedAdjustment::settle_on_inliers() {
     if (split_knots()) continue;
     if (!mark_outliers()) return true;
   }
+  return true;
+}
+
+// Until they stay; what is present is chosen each time. False if the adjustment does not settle.
+bool StagedAdjustment::settle_departures() {
+  constexpr int kMostRounds = 6;
+  constexpr double kStays = 0.3;  // standard deviations
+  bool settled = true;
+  for (int round = 0; round < kMostRounds; ++round) {
+    const bool departs =
+        departures_.estimate(selected_->data, adjusted_.state, adjusted_.at, true, &adjustment_);
+    if (!departs && !departs_) return settled;
+    departures_.subtract(adjusted_.state, adjusted_.at, &selected_->data);
+    // What contradicts made knots where none are needed, and may have led astray.
+    if (!departs_) adjusted_.state = start_;
+    departs_ = departs;
+    settled = settle_robustly();
+    if (departures_.change() < kStays) break;
+  }
+  return settled;
+}
+
+// At the minimum of least squares, with the noise as it is now known.
+bool StagedAdjustment::settle_known_departures() {
+  if (!departures_.estimate(selected_->data, adjusted_.state, adjusted_.at, false, &adjustment_))
+    return false;
+  departures_.subtract(adjusted_.state, adjusted_.at, &selected_->data);
+  if (!adjustment_.minimise({}, 20, 1e-4, &adjusted_.state, &adjusted_.at) ||
+      !adjustment_.covariance(adjusted_.at, &adjusted_.covariance, &telemetry_unknowns_)) {
+    return false;
+  }
+  telemetry_unknowns_ += departures_.unknowns();
   return true;
 }
 
@@ -159,6 +202,7 @@ bool StagedAdjustment::correct_noise(CalibrationQuality* quality) {
   }
   if (ratios.telemetry.contradicts()) {
     for (auto& sample : data.telemetry) sample.sigma *= ratios.telemetry.ratio;
+    departures_.scale_noise(ratios.telemetry.ratio);
     quality->telemetry_sigma_ratio *= ratios.telemetry.ratio;
   }
   return ratios.pixel.contradicts() || ratios.telemetry.contradicts();
@@ -175,6 +219,10 @@ StageStatus StagedAdjustment::allow_for_repetition(CalibrationQuality* quality) 
       !adjustment_.covariance(adjusted_.at, &adjusted_.covariance, &telemetry_unknowns_)) {
     return {CalibrationStatus::kNotConverged,
             "the adjustment does not converge with errors that repeat from frame to frame"};
+  }
+  if (departs_ && !settle_known_departures()) {
+    return {CalibrationStatus::kNotConverged,
+            "the adjustment does not converge with the telemetry's errors"};
   }
   return {};
 }

@@ -8,6 +8,7 @@
 #include "core/calibration/input_selection.h"
 #include "core/calibration/stage_status.h"
 #include "core/calibration/start_values.h"
+#include "core/calibration/telemetry_departures.h"
 
 namespace alidade::internal {
 
@@ -16,18 +17,21 @@ struct Adjusted {
   AdjustmentState state;
   Linearisation at;
   GlobalMatrix covariance = GlobalMatrix::Zero();
+  TelemetryError telemetry_error;
 };
 
 class StagedAdjustment {
  public:
-  // selected must outlive this object, which sets outliers, noise and crossings in it.
-  StagedAdjustment(const StartValues& start, const TelemetryAngleNoise& noise, int max_knots,
-                   SelectedInput* selected);
+  // selected must outlive this object, which sets outliers, noise and crossings in it, and subtracts
+  // departures from its telemetry.
+  StagedAdjustment(const StartValues& start, const TelemetryAngleNoise& noise,
+                   const CalibrationOptions& options, SelectedInput* selected);
 
   // Cauchy loss; its scale follows the residuals' medians down to 3 sigmas. Splits the spline's
   // segments where the residuals ask for it (knot_choice.h). Then replaces rounded telemetry by its
   // crossings (rounded_telemetry.h): readings hold a trajectory everywhere, crossings only a close
-  // one. Marks outliers at the end.
+  // one. Subtracts what departures the telemetry shows (telemetry_departures.h). Marks outliers at
+  // the end.
   void adjust_robustly();
 
   // Least squares on the rest, with outliers marked again. Noise levels that the residuals
@@ -42,6 +46,8 @@ class StagedAdjustment {
  private:
   [[nodiscard]] bool settle_robustly();
   [[nodiscard]] bool settle_on_inliers();
+  [[nodiscard]] bool settle_departures();
+  [[nodiscard]] bool settle_known_departures();
   bool split_knots();
   void replace_rounded_telemetry();
   bool mark_outliers();
@@ -55,7 +61,10 @@ class StagedAdjustment {
   int max_knots_;
   std::string doubt_;
   Adjustment adjustment_;
+  TelemetryDepartures departures_;
+  bool departs_ = false;  // telemetry has departures
   Adjusted adjusted_;
+  AdjustmentState start_;
   double telemetry_unknowns_ = 0;
   bool settled_ = false;  // by settle_robustly()
 };

@@ -147,7 +147,8 @@ int calibrate_one(const CalibrateOptions& options, CalibrationJob job, StopSigna
                                                  result.exclusions.describe(),
                                                  stated_priors(job.options),
                                                  "map.bin",
-                                                 {}};
+                                                 {},
+                                                 result.telemetry_error};
                     return save_calibration(path, result.calibration, notes, error);
                   });
   }

@@ -168,6 +168,7 @@ void SelfCalibration::store(const CalibrationResult& result, const MapState& map
   stored.notes.quality = result.quality;
   stored.notes.excluded = result.exclusions.describe();
   stored.notes.zoom_curve = nodes_.curve();
+  stored.notes.telemetry_error = result.telemetry_error;
   stored.map = map;
   std::string error;
   if (!archive_->save(stored, &error)) messages_.say(error + "; kept, will be tried again");
@@ -180,6 +181,7 @@ void SelfCalibration::publish(const CheckedCalibration& checked) {
   fresh->map = map_from_keyframes(checked.result, session_.keyframes(checked.result));
   fresh->name = "live";
   fresh->zoom_curve = nodes_.curve();
+  fresh->telemetry_error = checked.result.telemetry_error;
   const CalibrationQuality& quality = checked.result.quality;
   messages_.say(
       fmt::format("calibrated from {} frames, {} landmarks: {}; residuals {:.2f} of the tracker's "

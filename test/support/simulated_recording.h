@@ -7,7 +7,9 @@
 // disturbances draw from a generator of their own, so that all else stays the same with and without.
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <limits>
@@ -54,6 +56,14 @@ struct Simulation {
   bool with_noise = true;         // tell the estimator the noise
   bool with_sequence = true;
   double pan_offset_rad = 0;  // of the whole path; angles are wrapped
+  // Telemetry reads amplitude sin(2 pi angle / period + phase) more, for each axis.
+  Eigen::Vector2d gear_amplitude_rad = Eigen::Vector2d::Zero();
+  Eigen::Vector2d gear_period_rad = Eigen::Vector2d::Ones();
+  Eigen::Vector2d gear_phase_rad = Eigen::Vector2d::Zero();
+  // Backlash between motor and camera. The encoder is on the motor, whose path is the one given,
+  // or behind the gear: then the camera's is given, and the reading is dragged.
+  Eigen::Vector2d play_rad = Eigen::Vector2d::Zero();
+  bool encoder_on_motor = true;
   Eigen::Vector2d optical_centre_offset_px = Eigen::Vector2d::Zero();
 
   [[nodiscard]] double field_of_view() const { return 2 * std::atan(width / (2 * focal_length)); }
@@ -124,6 +134,36 @@ inline Simulation draw_base_simulation(std::uint64_t seed) {
 
 namespace internal {
 
+// What a path drags along at half the play's width: the angles of each millisecond.
+class DraggedPath {
+ public:
+  DraggedPath(const Simulation& s)
+      : path_([s](double t) { return s.angles(t); }), half_(0.5 * s.play_rad) {
+    Eigen::Vector2d at = path_(kBegin_s);
+    for (double t = kBegin_s; t < s.duration_s - kBegin_s; t += kStep_s) {
+      at = dragged(at, t);
+      states_.push_back(at);
+    }
+  }
+  [[nodiscard]] Eigen::Vector2d operator()(double t) const {
+    const double steps = std::max(0.0, (t - kBegin_s) / kStep_s);
+    return dragged(states_[std::min(static_cast<std::size_t>(steps), states_.size() - 1)], t);
+  }
+
+ private:
+  static constexpr double kBegin_s = -3;
+  static constexpr double kStep_s = 1e-3;
+
+  [[nodiscard]] Eigen::Vector2d dragged(const Eigen::Vector2d& at, double t) const {
+    const Eigen::Vector2d driver = path_(t);
+    return at.cwiseMax(driver - half_).cwiseMin(driver + half_);
+  }
+
+  std::function<Eigen::Vector2d(double)> path_;
+  Eigen::Vector2d half_;
+  std::vector<Eigen::Vector2d> states_;
+};
+
 inline Eigen::Matrix3d camera_to_base(const Simulation& s, const Eigen::Vector2d& angle) {
   // Columns: where the camera's right, down and forward point in forward, right, down.
   Eigen::Matrix3d right_down_forward;
@@ -187,7 +227,18 @@ inline bool rolling_pixel(const Simulation& s, double frame_time, const Eigen::V
 
 }  // namespace internal
 
-inline SimulatedRecording simulate_with_truth(const Simulation& s) {
+inline SimulatedRecording simulate_with_truth(const Simulation& given) {
+  Simulation s = given;
+  std::function<Eigen::Vector2d(double)> encoder = [given](double t) { return given.angles(t); };
+  if (!given.play_rad.isZero()) {
+    const internal::DraggedPath dragged(given);
+    if (given.encoder_on_motor) {
+      s.path = dragged;
+      s.pan_offset_rad = 0;  // is in the path
+    } else {
+      encoder = dragged;
+    }
+  }
   std::mt19937_64 random(s.seed);
   std::mt19937_64 disturbance(s.seed + 0x9e3779b97f4a7c15u);
   std::normal_distribution<double> normal;
@@ -270,13 +321,16 @@ inline SimulatedRecording simulate_with_truth(const Simulation& s) {
   const double telemetry_phase = uniform(random) * telemetry_period;
   for (int m = 0; telemetry_phase + m * telemetry_period < s.duration_s + 2; ++m) {
     const double time = telemetry_phase + m * telemetry_period - 1;
-    const Eigen::Vector2d angle = s.angles(time);
+    const Eigen::Vector2d angle = encoder(time);
     CalibrationTelemetry sample;
     sample.stamp_s = time + s.clock_offset + stamp_noise(s.telemetry_stamp_sigma_s);
     if (s.with_sequence) sample.sequence = m;
     bool outlier = false;
-    const auto measure = [&](double true_angle, double scale) {
-      double measured = scale * true_angle + s.pan_tilt_sigma * normal(random);
+    const auto measure = [&](int axis, double scale) {
+      const double gear =
+          s.gear_amplitude_rad[axis] *
+          std::sin(2 * kPi * angle[axis] / s.gear_period_rad[axis] + s.gear_phase_rad[axis]);
+      double measured = scale * angle[axis] + gear + s.pan_tilt_sigma * normal(random);
       if (uniform(disturbance) < s.telemetry_outliers) {
         measured += s.telemetry_outlier_rad * std::normal_distribution<double>()(disturbance);
         outlier = true;
@@ -286,8 +340,8 @@ inline SimulatedRecording simulate_with_truth(const Simulation& s) {
       }
       return std::remainder(measured, 2 * kPi);
     };
-    sample.pan_rad = measure(angle[0], s.pan_scale);
-    sample.tilt_rad = measure(angle[1], s.tilt_scale);
+    sample.pan_rad = measure(0, s.pan_scale);
+    sample.tilt_rad = measure(1, s.tilt_scale);
     input.telemetry.push_back(sample);
     out.telemetry_time_s.push_back(time);
     out.telemetry_is_outlier.push_back(outlier);

@@ -1,0 +1,116 @@
+#pragma once
+// TelemetryDepartures: what telemetry reads beside the scaled angle, noise and steps, axis by axis:
+//   measured = scale angle + g(angle) + play     (core/model/telemetry_error.h, play.h)
+// The values of g at its knots and the width of the play are linear parameters that touch the
+// telemetry's residuals only. Whether they are there, how large and how smooth, the evidence says
+// (departure_evidence.h). Their posterior is subtracted from the readings, and its covariance adds
+// to that of all parameters. Where nothing is found, nothing changes. Angles rad. Allocates.
+// Derivation: docs/calibration.md.
+
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include "core/calibration/adjustment.h"
+#include "core/calibration/departure_evidence.h"
+#include "core/calibration/linearisation.h"
+#include "core/model/telemetry_error.h"
+
+namespace alidade::internal {
+
+class TelemetryDepartures {
+ public:
+  // fixed: the adjustment's. resolution: the readings' step. accuracy: standard deviation of each
+  // axis's angles that the maker claims; 0: no claim.
+  explicit TelemetryDepartures(const std::array<bool, kGlobalCount>& fixed, double resolution = 0,
+                               double accuracy = 0)
+      : fixed_(fixed), resolution_(resolution), accuracy_(accuracy) {}
+
+  // Estimates the departures at a minimum of the readings less what was subtracted last. choose:
+  // what is present is chosen anew; else it stays, with its A and L. False if nothing is present,
+  // or nothing can be said.
+  [[nodiscard]] bool estimate(const AdjustmentData& data, const AdjustmentState& state,
+                              const Linearisation& at, bool choose, Adjustment* adjustment);
+
+  // Sets the readings to what they were less the departures, their sigmas to what they were, but
+  // larger where the play's state is not known.
+  void subtract(const AdjustmentState& state, const Linearisation& at, AdjustmentData* data);
+
+  // The readings' sigmas were multiplied by this.
+  void scale_noise(double ratio);
+
+  // By how many standard deviations the latest estimate differs from what was subtracted.
+  [[nodiscard]] double change() const { return change_; }
+  // How many unknowns the telemetry determines here.
+  [[nodiscard]] double unknowns() const { return fit_.unknowns; }
+  // What the parameters' covariance gains.
+  [[nodiscard]] const GlobalMatrix& covariance() const { return covariance_; }
+  // As estimated.
+  [[nodiscard]] TelemetryError error() const;
+
+ private:
+  static constexpr int kRipples = 2;
+  static constexpr int kKinds = 2;
+  static constexpr std::array<PlayKind, kKinds> kKind = {PlayKind::kMotor, PlayKind::kOutput};
+
+  // The part of the reading that is play, for either kind.
+  struct PlayColumn {
+    double ahead = 0;   // rad, at the present width
+    double slope = 0;   // d ahead / d width
+    double unsure = 0;  // rad
+  };
+  struct Columns {  // of one reading of one axis
+    CurveWeights curve;
+    std::array<PlayColumn, kKinds> play;
+  };
+  struct Normal {  // of the departures c, all other unknowns eliminated
+    Eigen::MatrixXd S;
+    Eigen::VectorXd g;              // at c = 0
+    Eigen::MatrixXd of_parameters;  // d parameters / d c
+  };
+
+  void begin(const AdjustmentData& data, const AdjustmentState& state);
+  // No amplitude may be larger than some times what telemetry is off by.
+  void limit_amplitudes(const AdjustmentData& data, const AdjustmentState& state,
+                        const Linearisation& at);
+  void find_columns(const AdjustmentData& data, const AdjustmentState& state,
+                    const Linearisation& at);
+  void find_play(const AdjustmentData& data, const AdjustmentState& state, const Linearisation& at,
+                 int axis);
+  [[nodiscard]] bool eliminate(const AdjustmentData& data, const AdjustmentState& state,
+                               const Linearisation& at, Adjustment* adjustment, Normal* out) const;
+  [[nodiscard]] Eigen::MatrixXd claim() const;
+  // A head that errs by so much may well have play of that size, too, which slow movements do not
+  // tell from the clock offset.
+  void add_possible_play(Eigen::MatrixXd* sure) const;
+  // Parts of c: for each axis a curve, ripples on its knots, then play of either kind.
+  [[nodiscard]] static std::size_t curve_part(int axis) {
+    return static_cast<std::size_t>(axis * (1 + kRipples + kKinds));
+  }
+  [[nodiscard]] static std::size_t play_part(int axis, int kind) {
+    return curve_part(axis) + 1 + kRipples + static_cast<std::size_t>(kind);
+  }
+  [[nodiscard]] bool is_present(std::size_t part) const {
+    return !fit_.priors.empty() && fit_.priors[part].amplitude > 0;
+  }
+  [[nodiscard]] double value(std::size_t part) const { return fit_.mean[parts_[part].first]; }
+  // g at a reading.
+  [[nodiscard]] double curve_at(const Columns& columns, int axis) const;
+
+  std::array<bool, kGlobalCount> fixed_;
+  double resolution_;
+  double accuracy_;
+  std::vector<Vector2<double>> measured_;  // as read
+  std::vector<Vector2<double>> sigma_;
+  Vector2<double> typical_sigma_ = Vector2<double>::Ones();
+  std::array<AngleErrorCurve, 2> knots_{};  // without values
+  std::vector<DeparturePart> parts_;
+  std::vector<std::array<Columns, 2>> columns_;
+  DepartureFit fit_;
+  Eigen::VectorXd subtracted_;  // fit_.mean as it was
+  double change_ = 0;
+  GlobalMatrix covariance_ = GlobalMatrix::Zero();
+};
+
+}  // namespace alidade::internal
