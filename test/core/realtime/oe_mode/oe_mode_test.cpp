@@ -217,7 +217,7 @@ TEST(OeMode, IsTelemetryAloneWhileTheLensIsCovered) {
   EXPECT_EQ(in_oe_after, 7);
 }
 
-TEST_F(OeModeOnFrames, RecoversFromTelemetryThatIsFarOffAndSaysSo) {
+TEST_F(OeModeOnFrames, BeginsAtThePreviousFrameWhereTelemetryLeavesMuchOpen) {
   start(30);
   for (int k = 30; k < 46; ++k) {
     telemetry_ = camera_.telemetry(k);
@@ -229,7 +229,7 @@ TEST_F(OeModeOnFrames, RecoversFromTelemetryThatIsFarOffAndSaysSo) {
     ASSERT_EQ(oe_.process(camera_.image(k), VirtualCamera::time_s(k), &telemetry_, &frame_),
               OeStatus::kOk)
         << k;
-    EXPECT_NEAR(oe_.statistics().coarse_shift_px, 60, 8);
+    EXPECT_LT(oe_.statistics().coarse_shift_px, 8);
     expect_honest(camera_, k, frame_);
     double px = 0;
     double square = 0;
