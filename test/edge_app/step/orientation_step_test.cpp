@@ -839,7 +839,12 @@ TEST(OrientationStep, RecordsTellTheFocalLengthThatIsLearntWithAZoomCurveOnly) {
     OrientationRecord record;
     for (int i = 0; i <= 60; ++i) {
       const double t = 0.08 * i;
-      turning.feed(&step, t, t + 0.07);
+      for (int k = 0; k < 4; ++k) {
+        PanTiltSample sample = turning.sample(t + 0.02 * k);
+        // Equal differences would be a resolution.
+        sample.pan_rad += options.telemetry_noise.pan_tilt_sigma * std::sin(i * i + 2 * k);
+        step.add_telemetry(sample);
+      }
       StepEvents events;
       record = step.add_frame(stamp_at(t, i), scene.image(i), &events);
       step.maintain();
