@@ -27,6 +27,10 @@ Division by_time(double begin_s, double end_s, int parts) {
           }};
 }
 
+int samples_of(double begin_s, double end_s) {
+  return static_cast<int>(std::ceil((end_s - begin_s) / kSample));
+}
+
 double angle_at(const TrajectorySpline& trajectory, int axis, double t) {
   return trajectory.position(t).vector()[axis];
 }
@@ -36,7 +40,8 @@ Division by_angle(const TrajectorySpline& trajectory, double begin_s, double end
                   int parts) {
   double least = angle_at(trajectory, axis, begin_s);
   double most = least;
-  for (double t = begin_s; t < end_s; t += kSample) {
+  for (int i = 0; i < samples_of(begin_s, end_s); ++i) {
+    const double t = begin_s + i * kSample;
     const double angle = angle_at(trajectory, axis, t);
     least = std::min(least, angle);
     most = std::max(most, angle);
@@ -53,7 +58,8 @@ Division by_angle(const TrajectorySpline& trajectory, double begin_s, double end
 Division by_run(const TrajectorySpline& trajectory, double begin_s, double end_s, int axis) {
   double least = angle_at(trajectory, axis, begin_s);
   double most = least;
-  for (double t = begin_s; t < end_s; t += kSample) {
+  for (int i = 0; i < samples_of(begin_s, end_s); ++i) {
+    const double t = begin_s + i * kSample;
     least = std::min(least, angle_at(trajectory, axis, t));
     most = std::max(most, angle_at(trajectory, axis, t));
   }
@@ -62,7 +68,8 @@ Division by_run(const TrajectorySpline& trajectory, double begin_s, double end_s
   double extreme = angle_at(trajectory, axis, begin_s);
   double extreme_time = begin_s;
   double direction = 0;
-  for (double t = begin_s; t < end_s; t += kSample) {
+  for (int i = 0; i < samples_of(begin_s, end_s); ++i) {
+    const double t = begin_s + i * kSample;
     const double angle = angle_at(trajectory, axis, t);
     if (direction == 0) {
       if (std::abs(angle - extreme) > back) direction = angle > extreme ? 1 : -1;

@@ -120,7 +120,7 @@ DeparturePrior best_number(const PartData& data) {
 template <class Gain>
 void climb(double step, double finest, double least, double largest, Gain gain, double* at,
            double* best) {
-  for (; step > finest; step = std::sqrt(step)) {
+  while (step > finest) {
     for (const double factor : {step, 1 / step}) {
       for (;;) {
         const double next = *at * factor;
@@ -131,6 +131,7 @@ void climb(double step, double finest, double least, double largest, Gain gain, 
         *at = next;
       }
     }
+    step = std::sqrt(step);
   }
 }
 
@@ -192,7 +193,10 @@ DeparturePrior best_prior(const PartData& data, const DeparturePart& part) {
   const auto knots = static_cast<double>(part.count - 1);
   switch (part.shape) {
     case DepartureShape::kCurve:
-      for (double L = kShortestCurve; L <= knots; L *= kCurveStep) lengths.push_back(L);
+      if (kShortestCurve <= knots) lengths.push_back(kShortestCurve);
+      while (!lengths.empty() && lengths.back() * kCurveStep <= knots) {
+        lengths.push_back(lengths.back() * kCurveStep);
+      }
       return best_shape(data, part, lengths, kCurveStep, kFinestCurve);
     case DepartureShape::kRipple:
       for (double periods = 1 / kLongestRipple; periods * kShortestRipple <= knots;
