@@ -101,7 +101,11 @@ class StatusPage(SystemTest):
 
     def config(self, camera, mode="OE", detectors=None, **output):
         image = SETTINGS["image"]
-        return self.write_config(camera, video={"width": image["width"], "height": image["height"]},
+        sections = {}
+        if mode == "PT":
+            # Stated, so that no picture has to tell the delay.
+            sections["calibration"] = {"file": str(camera.truth / "truth.yaml"), "auto": False, "clock_offset_sigma_ms": 1}
+        return self.write_config(camera, **sections, video={"width": image["width"], "height": image["height"]},
                                  focal_length_px=SETTINGS["camera"]["focal_length_px"], realtime={"mode": mode},
                                  output={"json": True, "http": "127.0.0.1:0", **output}, tracking={}, detectors=detectors or {})
 
