@@ -19,7 +19,7 @@ void require_sound(const Config& config) {
   FUZZ_REQUIRE(is_within(video.width, 0, 65536) && is_within(video.height, 0, 65536));
   FUZZ_REQUIRE((video.width == 0) == (video.height == 0));
   FUZZ_REQUIRE(is_within(video.timeout_s, 0.1, 3600) && is_within(video.max_backoff_s, 0.1, 3600));
-  FUZZ_REQUIRE(!video.url.empty() || !video.directory.empty());
+  FUZZ_REQUIRE(!video.url.empty() || !video.directory.empty() || !video.device.empty());
   const PanTiltConfig& pan_tilt = config.pan_tilt;
   FUZZ_REQUIRE(is_within(pan_tilt.rate_hz, 0.1, 1000) && is_within(pan_tilt.camera, 0, 64));
   FUZZ_REQUIRE(is_within(pan_tilt.timeout_s, 0.1, 3600));
