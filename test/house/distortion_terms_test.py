@@ -19,6 +19,7 @@ PARTS = (("edge_app/output/openapi.yaml", "    ZoomCurve:", "    Calibration:"),
          ("ros_wrapper/alidade_ros/src/conversions.cpp", None, None),
          ("ros_wrapper/alidade_ros/src/edge_bridge.cpp", "bool same_camera(", "}\n"),
          ("test/simulator/camera_model.cpp", None, None),
+         ("test/support/calibration_errors.py", None, None),
          ("scripts/demo_report.py", None, None))
 
 

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Lists that nothing else compares: is each source built, does each type of video keep the contract, is each scheme's name looked up?"""
+"""Lists that nothing else compares: is each source built, does each type of link keep the contract, is each scheme's name looked up, has
+each kind that a configuration can name its line in the test of the examples, and a seed of the fuzzer?"""
 import pathlib
 import re
 import unittest
@@ -34,6 +35,17 @@ class Sources(unittest.TestCase):
         self.assertFalse(lost, "in no CMakeLists.txt of their folders: " + ", ".join(lost))
 
 
+def contract_cases(texts):
+    """The names of cases and suites in these tests, in small letters."""
+    pairs = [pair for text in texts for pair in re.findall(r'\{"(\w+)"|INSTANTIATE_TEST_SUITE_P\(\s*(\w+)', text)]
+    return [name.lower() for pair in pairs for name in pair if name]
+
+
+def pan_tilt_types():
+    """Without the heads on a line."""
+    return re.findall(r'\{"(\w+)", Type::k\w+', read("edge_app/config/pan_tilt_config.cpp"))
+
+
 class VideoTypes(unittest.TestCase):
     def setUp(self):
         config = read("edge_app/config/video_config.cpp")
@@ -43,12 +55,8 @@ class VideoTypes(unittest.TestCase):
         self.assertGreater(len(self.schemes), 3)
 
     def test_keep_the_contract_of_sources(self):
-        cases = set()
-        for path in files("*.cpp", "test"):
-            text = read(path)
-            if '"test/platform/video/frame_source_contract.h"' in text:
-                cases.update(re.findall(r'\{"(\w+)"|INSTANTIATE_TEST_SUITE_P\(\s*(\w+)', text))
-        names = [name.lower() for pair in cases for name in pair if name]
+        header = '"test/platform/video/frame_source_contract.h"'
+        names = contract_cases(text for text in map(read, files("*.cpp", "test")) if header in text)
         for one in self.types:
             self.assertTrue(any(name.startswith(one) for name in names), f"FrameSourceContract has no case whose name begins with {one}")
 
@@ -57,6 +65,45 @@ class VideoTypes(unittest.TestCase):
         for scheme in self.schemes:
             if scheme != "rtp":  # an address of this machine or of a group
                 self.assertIn(f'"{scheme}"', tested, "test/system/resolver_test.py: test_of_a_camera")
+
+
+class PanTiltTypes(unittest.TestCase):
+    def test_keep_the_contract_of_sources(self):
+        """Heads on a line do by their rows in head_kinds.cpp."""
+        names = contract_cases([read("test/platform/pan_tilt/pan_tilt_source_contract_test.cpp")])
+        self.assertGreater(len(pan_tilt_types()), 3)
+        for one in pan_tilt_types():
+            if one != "none":
+                self.assertTrue(any(name.startswith(one) for name in names), f"PanTiltSourceContract has no case whose name begins with {one}")
+
+
+class ConfiguredKinds(unittest.TestCase):
+    def setUp(self):
+        self.kinds = {
+            "video": re.findall(r'\{VideoConfig::Type::k\w+, "(\w+)"', read("edge_app/config/video_config.cpp")),
+            "pan_tilt": pan_tilt_types() + re.findall(r'\{HeadType::k\w+, "(\w+)"', read("platform/pan_tilt/heads.h")),
+            "detectors": re.findall(r'\{DetectorKind::k\w+, "(\w+)"', read("edge_app/tracking/detector_kinds.h"))}
+        for section, kinds in self.kinds.items():
+            self.assertGreater(len(kinds), 2, section)
+
+    def assert_all(self, patterns, texts, where):
+        """patterns: of a section whose kinds are values of `type`; of `detectors`, whose kinds are keys."""
+        for section, kinds in self.kinds.items():
+            for kind in kinds:
+                pattern = patterns[section == "detectors"].replace("SECTION", section).replace("KIND", kind)
+                self.assertTrue(any(re.search(pattern, text, re.MULTILINE) for text in texts), f"{where}: no {section} with {kind}")
+
+    def test_have_a_line_in_the_test_of_the_examples(self):
+        test = "TheExamplesShowEveryKey"
+        text = read("test/edge_app/config/config_test.cpp")
+        begin = text.index(test)
+        self.assert_all((r'\{"SECTION", "\{type: KIND\b', r'\{"SECTION", "\{KIND: '), [text[begin:text.index("\nTEST", begin)]],
+                        f"test/edge_app/config/config_test.cpp, `sections` of {test}")
+
+    def test_have_a_seed_of_the_fuzzer(self):
+        folder = "test/fuzz/corpus/config"
+        seeds = [path.read_text(encoding="utf-8", errors="replace") for path in sorted((TOP / folder).iterdir())]
+        self.assert_all((r"^SECTION:\s+\{?type: KIND\b", r"^SECTION:(\n  .*)*\n  KIND:|^SECTION: .*\bKIND: "), seeds, folder)
 
 
 if __name__ == "__main__":
