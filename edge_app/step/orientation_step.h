@@ -106,9 +106,9 @@ class OrientationStep {
   // The connection to the pan/tilt source was lost. The next sample ends that state.
   void telemetry_lost();
 
-  // image: if there is none, not valid(). In PT mode it is only compared with the one before
-  // (repeated_images.h); `run` and `replay` then give none. It must outlive the maintain() that
-  // follows.
+  // image: if there is none, not valid(). In PT mode the record does not depend on it: maintain()
+  // follows points through it, if follow_turns says so; else `run` and `replay` give none. It must
+  // outlive the maintain() that follows.
   OrientationRecord add_frame(const FrameStamp& stamp, const ImageView& image, StepEvents* events);
   // Call once the record is out: updates the landmark map with the frame added last, or follows
   // points through it.

@@ -1,9 +1,12 @@
 #!/usr/bin/env python3
 """Lists that nothing else compares: is each source built, does each type of link keep the contract, is each scheme's name looked up, has
-each kind that a configuration can name its line in the test of the examples, and a seed of the fuzzer?"""
+each kind that a configuration can name its line in the test of the examples, and a seed of the fuzzer, is each value of the API
+described?"""
 import pathlib
 import re
 import unittest
+
+import yaml
 
 TOP = pathlib.Path(__file__).resolve().parents[2]
 ROOMS = ("core", "platform", "edge_app", "ros_wrapper")
@@ -104,6 +107,44 @@ class ConfiguredKinds(unittest.TestCase):
         folder = "test/fuzz/corpus/config"
         seeds = [path.read_text(encoding="utf-8", errors="replace") for path in sorted((TOP / folder).iterdir())]
         self.assert_all((r"^SECTION:\s+\{?type: KIND\b", r"^SECTION:(\n  .*)*\n  KIND:|^SECTION: .*\bKIND: "), seeds, folder)
+
+
+class Answers(unittest.TestCase):
+    """Of HTTP: what an object inside an answer holds is described. test/system/http_test.py asks that of the answer itself only."""
+
+    def setUp(self):
+        self.description = yaml.safe_load(read("edge_app/output/openapi.yaml"))
+
+    def described(self, schema, seen):
+        """The names of all members, also of what it refers to."""
+        if isinstance(schema, list):
+            return set().union(*(self.described(part, seen) for part in schema))
+        if not isinstance(schema, dict):
+            return set()
+        names = set(schema.get("properties", ()))
+        if isinstance(schema.get("required"), list):
+            names.update(schema["required"])
+        name = str(schema.get("$ref", "")).rpartition("/")[2]
+        if name and name not in seen:
+            seen.add(name)
+            names |= self.described(self.description["components"]["schemas"].get(name), seen)
+        return names.union(*(self.described(part, seen) for part in schema.values()))
+
+    def check(self, schema, sources):
+        described = self.described(schema, set())
+        for source in sources:
+            said = set(re.findall(r'(?:\{|\[)"([a-z_0-9]+)"[],]', read(source)))
+            self.assertTrue(said, source)
+            missing = said - described
+            self.assertFalse(missing, f"{source}: openapi.yaml does not describe " + ", ".join(sorted(missing)))
+
+    def test_status_is_described(self):
+        self.check(self.description["components"]["schemas"]["Status"],
+                   ("edge_app/output/service_status.cpp", "edge_app/output/scene_json.cpp", "edge_app/output/clock_pair.cpp"))
+
+    def test_other_json_is_described(self):
+        self.check(self.description, [*files("*_json.cpp", "edge_app/output"),
+                                      *(f"edge_app/output/{name}.cpp" for name in ("http_api", "pixel_query", "status_page"))])
 
 
 if __name__ == "__main__":

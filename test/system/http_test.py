@@ -128,14 +128,17 @@ def events(file):
 
 
 class Http(SystemTest):
-    def start(self, mode="PT", json_output=True, settings=None, calibration=None, **sections):
-        """alidade with the virtual camera, answering. calibration: entries of it that take the place of the truth's."""
+    def start(self, mode="PT", json_output=True, settings=None, calibration=None, clock_offset_sigma_ms=None, **sections):
+        """alidade with the virtual camera, answering. calibration: entries of it that take the place of the truth's.
+        clock_offset_sigma_ms: stated, so that in mode PT no picture has to tell the delay."""
         camera = self.camera(settings=settings)
         if calibration:
             file = self.folder / "calibration.yaml"
             truth = yaml.safe_load((camera.truth / "truth.yaml").read_text(encoding="utf-8"))
             file.write_text(json.dumps({**truth, **calibration}))
             sections["calibration"] = {"file": str(file), "auto": False}
+        if clock_offset_sigma_ms:
+            sections["calibration"] = {"file": str(camera.truth / "truth.yaml"), "auto": False, "clock_offset_sigma_ms": clock_offset_sigma_ms}
         targets = {"targets": str(self.folder / "targets.jsonl")} if "tracking" in sections else {}
         config = self.write_config(camera, output={"json": json_output, "http": "127.0.0.1:0", "token_env": "TEST_TOKEN", **targets},
                                    realtime={"mode": mode}, **sections)
@@ -394,7 +397,7 @@ class Http(SystemTest):
         self.end(run)
 
     def test_says_that_there_is_no_picture_where_none_is_decoded(self):
-        run, api = self.start(mode="PT")
+        run, api = self.start(mode="PT", clock_offset_sigma_ms=1)
         for path in ("/api/v1/picture", "/api/v1/overlay"):
             self.assertIn("mode: PT", self.check_answer(api, path, 503)["error"])
         self.end(run)
