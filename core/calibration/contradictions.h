@@ -1,11 +1,11 @@
 #pragma once
-// Whether parts of a recording contradict each other, and by how much the sigmas must grow then.
-// Parts: blocks of time, cells of an axis's angle, runs between an axis's reversals; each long
-// against what errors of neighbouring frames have in common. Whatever the model leaves out and the
+// Do parts of a recording contradict each other, and by how much must the sigmas then grow? Parts
+// are blocks of time, cells of an axis's angle, or runs between two reversals of an axis. Each is
+// longer than errors of neighbouring frames are correlated. What the model leaves out and the
 // trajectory does not absorb moves the parameters part by part:
-//   z_c = sum of F_i e_i over the rows of part c        F_i influence, of observations and telemetry
-//   growth of parameter p = sum_c z_c,p^2 / sum_c V_c,pp   V_c: variance of z_c if errors are white
-// Nothing grows unless that is beyond chance. Derivation: docs/calibration.md. Allocates.
+//   z_c = sum of F_i e_i over the rows of part c           F_i influence, e_i residual
+//   growth of parameter p = sum_c z_c,p^2 / sum_c V_c,pp   V_c: variance of z_c with white errors
+// A growth that chance explains is left out. Derivation: docs/calibration.md. Allocates.
 
 #include <functional>
 #include <string>

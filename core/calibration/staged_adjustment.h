@@ -22,8 +22,8 @@ struct Adjusted {
 
 class StagedAdjustment {
  public:
-  // selected must outlive this object, which sets outliers, noise and crossings in it, and subtracts
-  // departures from its telemetry.
+  // *selected must outlive this object, which sets outliers, noise and crossings in it, and
+  // subtracts departures from its telemetry.
   StagedAdjustment(const StartValues& start, const TelemetryAngleNoise& noise,
                    const CalibrationOptions& options, SelectedInput* selected);
 

@@ -2,9 +2,10 @@
 // Play (backlash) of width b between two angles: the driver d, and the angle that it drags.
 //   dragged = d - (b / 2) h,   h_i = clip(h_(i-1) + 2 (d_i - d_(i-1)) / b, -1, 1)
 // Encoder on the motor: the reading drives, the camera is dragged. Encoder behind the gear: the
-// camera drives, the reading is dragged. h is the state, unknown at first, anywhere in an interval.
-// Each movement narrows it, until it is a point once the driver moved by b in one direction. Angles in rad, any turn; differences go the short way round, so neighbours must be
-// less than half a turn apart. Plain values; no allocation.
+// camera drives, the reading is dragged. h is the state: at first anywhere in [-1, 1]. Each
+// movement narrows that interval.
+// A movement by b in one direction makes it known. Angles are rad, any turn. Differences go the
+// short way round, so neighbours must be less than half a turn apart. Plain values; no allocation.
 
 #include <algorithm>
 #include <cmath>

@@ -54,8 +54,8 @@ struct OrientationRecord {
   // trusted angle of telemetry. max_extrapolation_s limits it. Negative: samples enclose the frame.
   // Empty without a sample, and where time_s is.
   std::optional<double> telemetry_age_s;
-  // The frame that tied the record to the scene map's base. Empty: the base is telemetry's, or there
-  // is no orientation.
+  // The frame that tied the record to the scene map's base. Empty: the base is telemetry's, or the
+  // record has no orientation.
   struct Localized {
     double age_s = 0;      // of that frame
     double sigma_rad = 0;  // that the tie adds to a direction: root mean square of pan and tilt

@@ -1,9 +1,9 @@
 #pragma once
-// TelemetryIntake: pan/tilt samples as they come, with the time of their clock (capture_clock.h) or
-// of their poll, in a buffer that frames query (telemetry_buffer.h). It is emptied when the
-// connection or the clock restarts, or the times begin to be of the other kind. What the calibration
-// knows of the angles' error is taken out (telemetry_correction.h). Fixed memory; no allocation.
-// One thread.
+// TelemetryIntake: puts pan/tilt samples into a buffer that frames query (telemetry_buffer.h). A
+// sample's time comes from the clock of its stamps (capture_clock.h), else from its poll. The
+// buffer is emptied when the connection or the clock restarts, and when the times change from one
+// of these kinds to the other. Known errors of the angles are subtracted (telemetry_correction.h).
+// Fixed memory; no allocation. One thread.
 
 #include <array>
 #include <cstddef>
@@ -69,8 +69,8 @@ class TelemetryIntake {
 
   [[nodiscard]] Samples empty(bool filtered) const;
   [[nodiscard]] bool is_stalled_poll(const PanTiltSample& sample);
-  // Corrects it and puts it into the buffer, which counts what it refuses (a duplicate, a value that
-  // is not finite); the records' sigma shows the effect.
+  // Corrects a sample and puts it into the buffer. The buffer counts the samples that it refuses (a
+  // duplicate, a value that is not finite); the records' sigma shows the effect.
   void store(const TelemetrySample& measured);
   // Fills the buffer anew with the latest samples as measured.
   void store_again();

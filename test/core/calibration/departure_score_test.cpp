@@ -57,7 +57,7 @@ Planted plant(const Vector2<double>& theta) {
   adjustment.visit(
       state, at,
       [&](const ObservationRow& row) {
-        // A displacement of what is seen, not of the projection at a row's time: A has no part in it.
+        // This displaces what is seen, not the projection at a row's time: A has no part in it.
         const AdjustmentObservation& o = scene.data.observations[row.index];
         scores[0].add(row, 1, of_picture(o.u) / o.sigma);
       },

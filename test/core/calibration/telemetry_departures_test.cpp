@@ -114,7 +114,8 @@ TEST(TelemetryDepartures, LearnGearAndPlayOfRoundedReadings) {
   EXPECT_GT(result.telemetry_error.pan.count, 10);
 }
 
-// Each error in its sigmas over recordings: 99.99 % of chi-square with 8 degrees of freedom lie in (0.7, 32).
+// Sum of (error / sigma)^2 over the recordings: 99.99 % of chi-square with 8 degrees of freedom lie
+// in (0.7, 32).
 TEST(TelemetryDepartures, LeaveParametersWithErrorsThatTheirSigmasSay) {
   constexpr int kRuns = 8;
   Eigen::Matrix<double, kParameterCount, 1> nees;
