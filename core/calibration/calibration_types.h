@@ -189,21 +189,21 @@ struct TelemetryResidual {
   bool outlier = false;
 };
 
-// Parts of the recording disagree in a parameter beyond chance. Its sigma has grown to what they
-// show.
+// Parts of the recording disagree in a parameter by more than chance. Its sigma has grown
+// accordingly.
 struct CalibrationContradiction {
   std::string parameter;
   std::string between;  // which parts: "stretches of time"
-  double scatter = 1;   // of the parts' values, where 1 is what their noise makes it
+  double scatter = 1;   // of the parts' values, over the scatter that their noise explains
 };
 
-// A departure from the model that the residuals show beyond chance. The sigmas have what it does to
-// the parameters.
+// A departure from the model that the residuals show beyond chance. The sigmas include its effect
+// on the parameters.
 struct CalibrationCause {
   std::string cause;  // "play of pan"
   double chi_square = 0;
   double freedom = 0;
-  double size = 0;  // root mean square
+  double size = 0;  // of the departure, root mean square, in `unit`
   std::string unit;
 };
 
@@ -230,7 +230,7 @@ struct CalibrationQuality {
   std::optional<CalibrationContradiction> contradiction;  // the worst
   std::vector<CalibrationCause> causes;                   // the likeliest first
 
-  // What contradicts the model and what may be the cause, a line each.
+  // One line for each contradiction and each likely cause.
   [[nodiscard]] std::vector<std::string> describe_departures() const;
 };
 

@@ -22,16 +22,17 @@ struct Division {
   std::function<int(double time_s)> part_at;  // image clock
 };
 
-// What one division says of one parameter.
+// What one division shows about one parameter.
 struct PartGrowth {
-  double ratio = 1;    // of variances, of the share that the data decide
-  double freedom = 0;  // independent parts behind it; 0: none
-  double share = 0;    // of the variance, that rows in parts decide
+  double ratio = 1;    // growth of the variance, as above
+  double freedom = 0;  // number of independent parts; 0: nothing is known
+  double share = 0;    // of the variance that the rows decide; the rest is the prior's
 };
 
-// How the parts disagree most improbably. scatter: of the parts' values, 1 where they agree.
+// The most improbable disagreement. scatter: of the parts' values, over the scatter that their
+// noise explains.
 struct Contradiction {
-  int parameter = -1;  // as in GlobalVector; -1: nothing is beyond chance
+  int parameter = -1;  // index in GlobalVector; -1: chance explains all
   std::string between;
   double scatter = 1;
 };
@@ -41,16 +42,18 @@ struct ContradictionCheck {
   Contradiction worst;
 };
 
-// Over the time from which frames come.
+// The usual divisions of the frames' time span (s, image clock); none if it is empty. The
+// trajectory must outlive them.
 [[nodiscard]] std::vector<Division> usual_divisions(const TrajectorySpline& trajectory,
                                                     double begin_s, double end_s);
 
-// Of each division, of each parameter.
+// Indices of the result: division, parameter.
 [[nodiscard]] std::vector<std::vector<PartGrowth>> part_growth(
     const std::vector<Division>& divisions, const Adjustment& adjustment,
     const AdjustmentState& state, const Linearisation& at, const ReducedFactor& factor);
 
-// The largest growth that any division shows beyond chance, at 1 % for all of them together.
+// The largest growth beyond chance in any division. False alarms: 1 % for all divisions and
+// parameters together.
 [[nodiscard]] ContradictionCheck check_contradictions(const std::vector<Division>& divisions,
                                                       const Adjustment& adjustment,
                                                       const AdjustmentState& state,
