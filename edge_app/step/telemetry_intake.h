@@ -22,11 +22,11 @@ struct TelemetryIntakeOptions {
   ClockFilterOptions clock;
   // s, one standard deviation of a receive time that is used as the capture time.
   double stamp_sigma_s = 5e-3;
-  // Its period_sigma_s applies to filtered times only. resolution 0: what the readings show.
+  // Its period_sigma_s applies to filtered times only. resolution 0: found from the readings.
   TelemetryNoise noise;
   TelemetryLimits limits;
   // True: samples of stalled polls are left out, as nobody knows when they were true, unless a
-  // locked clock tells it.
+  // locked clock gives their time.
   bool leave_out_stalled = false;
 };
 
@@ -48,7 +48,7 @@ class TelemetryIntake {
     is_lost_ = true;
     correction_.forget_state();
   }
-  // From now on, and for the latest samples, the errors of these angles are known.
+  // Subtracts these errors of the angles from now on, and from the latest samples.
   void correct_by(const Mechanics<double>& mechanics, const TelemetryError& error);
   [[nodiscard]] bool is_lost() const { return is_lost_; }
 
@@ -74,7 +74,7 @@ class TelemetryIntake {
   void store(const TelemetrySample& measured);
   // Fills the buffer anew with the latest samples as measured.
   void store_again();
-  // White noise of a quarter of a step or more dithers the readings: then the step does not matter.
+  // rad. White noise of a quarter of a step or more dithers the readings: the result is then 0.
   [[nodiscard]] double resolution_shown() const;
 
   TelemetryIntakeOptions options_;
