@@ -115,13 +115,17 @@ struct CalibrationStatistics {
 inline constexpr double kBeyondSigmas = 4.5;
 [[nodiscard]] CalibrationStatistics calibration_statistics(const std::vector<SeedResult>& seeds);
 
-// Mean, ratio and root mean squares of frames in OE mode; the worst of all frames.
+// Of the frames in OE mode, unless stated.
 struct ReplayStatistics {
-  int frames = 0, answered = 0, oe = 0;
-  double nees = 0, worst = 0;
-  double sigma_over_error = 0;
-  double rms_px = 0, relative_px = 0;
-  double pt_nees = 0;  // of the frames in PT mode
+  int frames = 0;               // all
+  int answered = 0;             // with an orientation, in any mode
+  int oe = 0;                   // in OE mode
+  double nees = 0;              // mean of e^T C^-1 e / 2
+  double worst = 0;             // the largest of these, in any mode
+  double sigma_over_error = 0;  // median sigma_px over rms_px
+  double rms_px = 0;            // of e
+  double relative_px = 0;       // rms of e without a common rotation
+  double pt_nees = 0;           // of the frames in PT mode
 };
 [[nodiscard]] ReplayStatistics replay_statistics(const std::vector<SeedResult>& seeds);
 
