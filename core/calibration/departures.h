@@ -3,7 +3,7 @@
 // score tests of the residuals (departure_score.h). Each cause has linear columns of its own:
 //   telemetry   a function of either axis's angle (gear), its direction of motion (play), its speed
 //               (one axis late)
-//   pictures    focal length that drifts, r^5 distortion, optical centre, lag that grows with speed,
+//   pictures    focal length that drifts, r^5 distortion, optical centre, lag at speed,
 //               parallax (a pupil off the axes, and depth), part of the scene that drifts
 // The most improbable cause comes first, then what is improbable beside it. False alarms: 1 % for
 // all causes together. Derivation: docs/calibration.md. Allocates.
