@@ -87,9 +87,9 @@ struct CalibrationOptions {
   Vector3<double> pan_axis = Vector3<double>::UnitZ();
   Vector3<double> tilt_axis = Vector3<double>::UnitY();
   double axis_sigma_rad = 0.05;  // each tangent component
-  // The maker's claim of each axis's angles: standard deviation of errors that turn as slowly as the
-  // visited range, which no recording shows: they are a scale. 0: no claim; the scales' priors then
-  // hold as they are.
+  // The accuracy that the maker claims for the angles of either axis: one standard deviation, rad,
+  // of errors that vary slowly over the whole visited range. The recording cannot show them, as
+  // they look like a scale. 0: no claim; the priors of the scales hold as they are.
   double angle_accuracy_rad = 0;
 
   StampNoise image_stamps = StampNoise::kSymmetric;
@@ -189,21 +189,21 @@ struct TelemetryResidual {
   bool outlier = false;
 };
 
-// Parts of the recording disagree in a parameter beyond chance. Its sigma has grown to what they
-// show.
+// Parts of the recording disagree in a parameter by more than chance. Its sigma has grown
+// accordingly.
 struct CalibrationContradiction {
   std::string parameter;
   std::string between;  // which parts: "stretches of time"
-  double scatter = 1;   // of the parts' values, where 1 is what their noise makes it
+  double scatter = 1;   // of the parts' values, over the scatter that their noise explains
 };
 
-// A departure from the model that the residuals show beyond chance. The sigmas have what it does to
-// the parameters.
+// A departure from the model that the residuals show beyond chance. The sigmas include its effect
+// on the parameters.
 struct CalibrationCause {
   std::string cause;  // "play of pan"
   double chi_square = 0;
   double freedom = 0;
-  double size = 0;  // root mean square
+  double size = 0;  // of the departure, root mean square, in `unit`
   std::string unit;
 };
 
@@ -230,7 +230,7 @@ struct CalibrationQuality {
   std::optional<CalibrationContradiction> contradiction;  // the worst
   std::vector<CalibrationCause> causes;                   // the likeliest first
 
-  // What contradicts the model and what may be the cause, a line each.
+  // One line for each contradiction and each likely cause.
   [[nodiscard]] std::vector<std::string> describe_departures() const;
 };
 
@@ -238,8 +238,8 @@ struct CalibrationResult {
   CalibrationStatus status = CalibrationStatus::kBadInput;
   std::string message;      // what is wrong and what would help; with kOk a summary
   Calibration calibration;  // meaningful with kOk and, for diagnosis, kWeak
-  // What the telemetry reads beside the scaled angle, where the data show it. The calibration and its
-  // covariance allow for it.
+  // Errors of the telemetry's angles that the data show, besides scale and noise. The calibration
+  // and its covariance allow for them.
   TelemetryError telemetry_error;
   StreamTiming image_timing;
   StreamTiming telemetry_timing;

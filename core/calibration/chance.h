@@ -1,11 +1,10 @@
 #pragma once
-// How improbable a sum of squares is. No allocation.
+// How improbable a sum of squares is by chance. No allocation.
 
 namespace alidade::internal {
 
-// Natural logarithm of the probability that chi-square with `freedom` (> 0, not necessarily whole)
-// degrees of freedom exceeds `value`. Relative error of the logarithm below 1e-9 where it is below
-// -1.
+// Natural logarithm of the probability that chi-square with `freedom` degrees of freedom (> 0, any
+// real number) exceeds `value`. If the result is below -1, its relative error is below 1e-9.
 [[nodiscard]] double log_chance(double value, double freedom);
 
 }  // namespace alidade::internal

@@ -1,11 +1,11 @@
 #pragma once
-// Whether parts of a recording contradict each other, and by how much the sigmas must grow then.
-// Parts: blocks of time, cells of an axis's angle, runs between an axis's reversals; each long
-// against what errors of neighbouring frames have in common. Whatever the model leaves out and the
+// Do parts of a recording contradict each other, and by how much must the sigmas then grow? Parts
+// are blocks of time, cells of an axis's angle, or runs between two reversals of an axis. Each is
+// longer than errors of neighbouring frames are correlated. What the model leaves out and the
 // trajectory does not absorb moves the parameters part by part:
-//   z_c = sum of F_i e_i over the rows of part c        F_i influence, of observations and telemetry
-//   growth of parameter p = sum_c z_c,p^2 / sum_c V_c,pp   V_c: variance of z_c if errors are white
-// Nothing grows unless that is beyond chance. Derivation: docs/calibration.md. Allocates.
+//   z_c = sum of F_i e_i over the rows of part c           F_i influence, e_i residual
+//   growth of parameter p = sum_c z_c,p^2 / sum_c V_c,pp   V_c: variance of z_c with white errors
+// A growth that chance explains is left out. Derivation: docs/calibration.md. Allocates.
 
 #include <functional>
 #include <string>
@@ -22,16 +22,17 @@ struct Division {
   std::function<int(double time_s)> part_at;  // image clock
 };
 
-// What one division says of one parameter.
+// What one division shows about one parameter.
 struct PartGrowth {
-  double ratio = 1;    // of variances, of the share that the data decide
-  double freedom = 0;  // independent parts behind it; 0: none
-  double share = 0;    // of the variance, that rows in parts decide
+  double ratio = 1;    // growth of the variance, as above
+  double freedom = 0;  // number of independent parts; 0: nothing is known
+  double share = 0;    // of the variance that the rows decide; the rest is the prior's
 };
 
-// How the parts disagree most improbably. scatter: of the parts' values, 1 where they agree.
+// The most improbable disagreement. scatter: of the parts' values, over the scatter that their
+// noise explains.
 struct Contradiction {
-  int parameter = -1;  // as in GlobalVector; -1: nothing is beyond chance
+  int parameter = -1;  // index in GlobalVector; -1: chance explains all
   std::string between;
   double scatter = 1;
 };
@@ -41,16 +42,18 @@ struct ContradictionCheck {
   Contradiction worst;
 };
 
-// Over the time from which frames come.
+// The usual divisions of the frames' time span (s, image clock); none if it is empty. The
+// trajectory must outlive them.
 [[nodiscard]] std::vector<Division> usual_divisions(const TrajectorySpline& trajectory,
                                                     double begin_s, double end_s);
 
-// Of each division, of each parameter.
+// Indices of the result: division, parameter.
 [[nodiscard]] std::vector<std::vector<PartGrowth>> part_growth(
     const std::vector<Division>& divisions, const Adjustment& adjustment,
     const AdjustmentState& state, const Linearisation& at, const ReducedFactor& factor);
 
-// The largest growth that any division shows beyond chance, at 1 % for all of them together.
+// The largest growth beyond chance in any division. False alarms: 1 % for all divisions and
+// parameters together.
 [[nodiscard]] ContradictionCheck check_contradictions(const std::vector<Division>& divisions,
                                                       const Adjustment& adjustment,
                                                       const AdjustmentState& state,

@@ -1,12 +1,12 @@
 #pragma once
-// What the residuals say of the likeliest causes why a recording does not obey the model: score
-// tests (departure_score.h) of linear departures, each with its signature.
-//   telemetry: a function of either axis's angle (gear), its direction of motion (play), its speed
-//     (one axis late)
-//   pictures: the focal length over time, r^5 distortion, the optical centre, a lag that depends on
-//     speed, parallax (a pupil away from the axes, and depth), a drift of part of the scene
-// Greedy: the most improbable one, then what is improbable beside it. None is named where nothing
-// is beyond chance, at 1 % for all together. Derivation: docs/calibration.md. Allocates.
+// find_departures(): the likeliest causes of a recording's departures from the model, found by
+// score tests of the residuals (departure_score.h). Each cause has linear columns of its own:
+//   telemetry   a function of either axis's angle (gear), its direction of motion (play), its speed
+//               (one axis late)
+//   pictures    focal length that drifts, r^5 distortion, optical centre, lag at speed,
+//               parallax (a pupil off the axes, and depth), part of the scene that drifts
+// The most improbable cause comes first, then what is improbable beside it. False alarms: 1 % for
+// all causes together. Derivation: docs/calibration.md. Allocates.
 
 #include <vector>
 
@@ -17,7 +17,7 @@ namespace alidade::internal {
 
 struct Departures {
   std::vector<CalibrationCause> causes;       // the likeliest first
-  GlobalMatrix error = GlobalMatrix::Zero();  // squares of what they do to the parameters
+  GlobalMatrix error = GlobalMatrix::Zero();  // to add to the parameters' covariance
 };
 
 [[nodiscard]] Departures find_departures(const Adjustment& adjustment, const AdjustmentState& state,

@@ -1,21 +1,21 @@
 #pragma once
-// Whether landmarks lie at different distances, seen by a pupil before or behind the axes: each one
-// moves through the picture as if with a focal length of its own.
-//   u moves by a share rho o of its place from the middle,  rho inverse distance, o pupil (m)
-// Landmarks have errors of their own for other reasons, too. So what they show along the radius is
-// held against what they show across it, which no depth explains. What all rho o have in common is
-// a focal length and shows nowhere: it is taken to be as large as their spread.
-// Derivation: docs/calibration.md. Allocates.
+// depth_spread(): do landmarks lie at different distances, seen by a pupil before or behind the
+// axes? Then each landmark moves through the picture as if it had its own focal length:
+//   its image moves by a share rho o of its distance from the middle   rho 1/distance, o pupil (m)
+// Landmarks have other errors of their own, too. So errors along the radius are compared with those
+// across it, which no depth explains. What all rho o have in common is a focal length and shows
+// nowhere: it is taken to be as large as their spread. With fewer than 20 landmarks that move,
+// nothing is known. Derivation: docs/calibration.md. Allocates.
 
 #include "core/calibration/adjustment.h"
 
 namespace alidade::internal {
 
 struct DepthSpread {
-  double log_chance = 0;  // natural, of such an excess along the radius
+  double log_chance = 0;  // natural; of such an excess along the radius; 0: nothing is known
   double excess = 0;      // of the chi-square along the radius over that across it
-  double landmarks = 0;   // that moved through the picture
-  double sigma = 0;       // of rho o
+  double landmarks = 0;   // number that moved through the picture
+  double sigma = 0;       // of rho o, a relative change of the focal length
 };
 
 [[nodiscard]] DepthSpread depth_spread(const Adjustment& adjustment, const AdjustmentState& state,

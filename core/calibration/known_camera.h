@@ -1,12 +1,11 @@
 #pragma once
 // calibrate_knowing(): calibrate() with values known from elsewhere, such as a bench
-// (core/pattern).
-// Line delay and aspect belong to the sensor and hold at any zoom. Focal length and distortion hold
-// at one zoom; the recording's own focal length shows whether it has that zoom. So the recording
-// alone is calibrated first. A wanted value x that agrees, |x - x_alone| <= 5 sqrt(sigma^2 +
-// sigma_alone^2), becomes a prior of a second adjustment; distortion only if the focal length
-// agrees. Remarks name what is left out. If the recording alone has no solution, line delay and
-// aspect are used unchecked, with a remark. Pure, as calibrate(); takes twice its time.
+// (core/pattern). Line delay and aspect belong to the sensor and hold at any zoom. Focal length and
+// distortion hold at one zoom; the recording's own focal length shows whether it has that zoom. So
+// the recording alone is calibrated first. A wanted value x that agrees, |x - x_alone| <= 5
+// sqrt(sigma^2 + sigma_alone^2), becomes a prior of a second adjustment; distortion only if the
+// focal length agrees. Remarks name what is left out. If the recording alone has no solution, line
+// delay and aspect are used unchecked, with a remark. Pure, as calibrate(); takes twice its time.
 
 #include <string>
 #include <vector>

@@ -19,14 +19,13 @@ void set_telemetry_sigma(double white_sigma, double resolution, double stamp_sig
                          const TrajectorySpline& smooth,
                          std::vector<AdjustmentTelemetry>* telemetry);
 
-// Removes the bias of rounding. Where an axis moves less than two steps from sample to sample,
-// rounding errors are not noise: readings stay off to one side while the axis reverses. But
-// between two readings one step apart it passed half-way between them. That is added as a sample at
-// the middle of their times, with the uncertainty of the moment (trajectory time = telemetry time -
-// shift_s). All equal readings in a row together keep the weight of one with a sigma of the
-// resolution: enough to hold what nothing else holds. White noise of a quarter of the resolution or
-// more dithers the readings: they stay as they are. source[i]: index of the sample (the first of
-// the two) behind item i.
+// Removes the bias of rounding. While an axis moves by less than two steps from sample to sample,
+// rounding errors are not noise: the readings stay off to one side until the axis reverses. But
+// between two readings one step apart the axis passed half-way between them. That becomes a sample
+// at the middle of their times (trajectory time = telemetry time - shift_s). A run of equal
+// readings together keeps the weight of one reading with sigma = resolution: enough to hold what
+// nothing else holds. White noise of a quarter of the resolution or more dithers the readings: they
+// stay as they are. source[i]: index of the sample behind item i, of the first if there are two.
 [[nodiscard]] std::vector<AdjustmentTelemetry> add_crossings(
     const std::vector<AdjustmentTelemetry>& telemetry, double resolution, double white_sigma,
     const TrajectorySpline& trajectory, double shift_s, std::vector<std::size_t>* source);

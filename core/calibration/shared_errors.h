@@ -18,7 +18,8 @@ struct ErrorGrowth {
   GlobalVector freedom = GlobalVector::Zero();  // independent clusters behind it; 0: none
 };
 
-// cluster: of each observation, 0 to clusters - 1. covariance: of the parameters, zero where fixed.
+// cluster: that of each observation, 0 to clusters - 1. covariance: of the parameters, zero where
+// fixed.
 [[nodiscard]] ErrorGrowth error_growth(const std::vector<int>& cluster, int clusters,
                                        const AdjustmentData& data, const Linearisation& at,
                                        const std::vector<Influence>& influences,

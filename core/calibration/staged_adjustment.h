@@ -22,23 +22,23 @@ struct Adjusted {
 
 class StagedAdjustment {
  public:
-  // selected must outlive this object, which sets outliers, noise and crossings in it, and subtracts
-  // departures from its telemetry.
+  // *selected must outlive this object, which sets outliers, noise and crossings in it, and
+  // subtracts departures from its telemetry.
   StagedAdjustment(const StartValues& start, const TelemetryAngleNoise& noise,
                    const CalibrationOptions& options, SelectedInput* selected);
 
-  // Cauchy loss; its scale follows the residuals' medians down to 3 sigmas. Splits the spline's
-  // segments where the residuals ask for it (knot_choice.h). Then replaces rounded telemetry by its
-  // crossings (rounded_telemetry.h): readings hold a trajectory everywhere, crossings only a close
-  // one. Subtracts what departures the telemetry shows (telemetry_departures.h). Marks outliers at
-  // the end.
+  // Cauchy loss, whose scale follows the medians of the residuals, down to 3 sigmas. Splits
+  // segments of the spline if the residuals ask for it (knot_choice.h). Then replaces rounded
+  // telemetry by its crossings (rounded_telemetry.h), which need a trajectory that is already
+  // close. Subtracts the departures that telemetry shows (telemetry_departures.h). Marks outliers
+  // at the end.
   void adjust_robustly();
 
-  // Least squares on the rest, with outliers marked again. Noise levels that the residuals
-  // contradict beyond chance are replaced by the residuals' (noise_check.h). The covariance grows
-  // where residuals move the parameters together (shared_errors.h), and where parts of the
-  // recording contradict each other (contradictions.h). A robust loss on good data would inflate
-  // the sigmas. Sets the quality's steps, ratios, repetition and contradiction.
+  // Least squares on the rest, as a robust loss on good data would inflate the sigmas. Outliers are
+  // marked again. Noise levels that the residuals contradict beyond chance are replaced by the
+  // residuals' (noise_check.h). The covariance grows if residuals move the parameters together
+  // (shared_errors.h), and if parts of the recording contradict each other (contradictions.h). Sets
+  // the quality's steps, ratios, repetition and contradiction.
   [[nodiscard]] StageStatus adjust_on_inliers(CalibrationQuality* quality);
 
   [[nodiscard]] const Adjusted& adjusted() const { return adjusted_; }

@@ -32,8 +32,8 @@ struct MotionExtent {
   Vector2<double> largest_rate;  // rad/s
   Vector2<double> varying_rate;  // rad/s, standard deviation of the rate
 };
-// times_s: of the images. Outside their span nothing is measured, as the
-// trajectory rests on noisy telemetry alone there.
+// times_s: of the images. Outside their span nothing is measured, as the trajectory rests on noisy
+// telemetry alone there.
 [[nodiscard]] MotionExtent measure_motion(const TrajectorySpline& trajectory,
                                           const std::vector<double>& times_s);
 

@@ -1,6 +1,6 @@
 #pragma once
-// What telemetry is off by (core/model/telemetry_error.h) in a calibration.yaml. All keys may be
-// absent; then telemetry is exact but for scale and noise.
+// Errors of telemetry's angles (core/model/telemetry_error.h) in a calibration.yaml. All keys may
+// be absent: then telemetry is exact, except for scale and noise.
 //   pan_error: {knots_rad: {first: -0.4, spacing: 0.05}, values_rad: [...], sigma_rad: [...],
 //               length_rad: 0.1, unseen_sigma_rad: 2e-4}
 //   tilt_error: ...                                 likewise; without knots: unseen_sigma_rad alone

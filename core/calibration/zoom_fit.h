@@ -1,12 +1,11 @@
 #pragma once
 // fit_zoom(): from calibrations at some zoom readings to the ZoomCurve
 // (core/model/lens/zoom_curve.h).
-//   1 Each calibration, without its priors, is a linear observation of focal length, distortion and
-//     optical centre at its reading, and of the parameters that all readings share.
+//   1 Each calibration, without its priors, observes focal length, distortion and optical centre at
+//     its reading, and the parameters that all readings share.
 //   2 The likelihood chooses the curves' roughness q from a grid of factors about the usual value.
-//   3 Least squares with the curves as prior: one reading determines what another leaves open, such
-//     as the axes against the optical centre at the long end. Movements of the zoom between the
-//     dwells add nodes of log f (movement_evidence.h).
+//   3 Least squares with the curves as prior: one reading determines what another leaves open.
+//     Movements between the dwells add nodes of log f (movement_evidence.h).
 // Pure; allocates. Not for the real-time thread. Derivation: docs/calibration.md.
 
 #include <optional>

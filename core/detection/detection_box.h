@@ -14,14 +14,14 @@ struct DetectionBox {
   double v = 0;       // px, upper edge
   double width = 0;   // px
   double height = 0;  // px
-  double score = 1;   // larger is surer; the detector's scale, from outside 0 to 1
+  double score = 1;   // larger is surer, on the detector's scale; 0 to 1 from another program
   std::string name;   // class; empty: unknown
 
   [[nodiscard]] Vector2<double> foot() const { return {u + width / 2, v + height}; }
   [[nodiscard]] Vector2<double> middle() const { return {u + width / 2, v + height / 2}; }
 };
 
-// Common area over joint area, 0 to 1.
+// Intersection over union, 0 to 1.
 [[nodiscard]] double overlap(const DetectionBox& a, const DetectionBox& b);
 
 }  // namespace alidade

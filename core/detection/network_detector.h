@@ -1,11 +1,11 @@
 #pragma once
-// NetworkDetector: a user's YOLO, exported to ONNX, by OpenCV's cv::dnn. One input of 1 x 3 x
-// height x width, one output in pixels of the input, scores 0 to 1, N candidates of C classes:
+// NetworkDetector: a user's YOLO, exported to ONNX, run by OpenCV's cv::dnn. One input of 1 x 3 x
+// height x width. One output with N candidates of C classes, in pixels of the input, scores 0 to 1:
 //   1 x (4 + C) x N   YOLOv8: centre u, v, width, height, C class scores
-//   1 x N x (5 + C)   YOLOv5: the same, and before the class scores objectness, their factor
-// The picture is scaled to fit, in proportion, into the input's middle; the rest is grey 114
-// (letterbox); values 0 to 1. All three channels are the grey levels. Of overlapping boxes of any
-// class the surest stays (NMSBoxes). Takes scratch memory and threads as OpenCV does: not for the
+//   1 x N x (5 + C)   YOLOv5: the same, and before the class scores their factor, objectness
+// The picture is scaled in proportion to fit into the input's middle; the rest is grey 114
+// (letterbox). All three channels are the grey levels, 0 to 1. Of overlapping boxes, of any class,
+// the surest stays (NMSBoxes). Takes scratch memory and threads as OpenCV does: not for the
 // real-time thread. For one thread.
 
 #include <memory>
@@ -36,11 +36,11 @@ enum class NetworkStatus {
 
 class NetworkDetector {
  public:
-  // model: the bytes of a file. options must be valid. Runs once on an empty picture. N shows which
-  // output it is: v8 has one candidate for each cell of grids of strides 8, 16 and 32, v5 has
+  // model: the bytes of a file. options must be valid. Runs once on an empty picture. N tells the
+  // output's kind: v8 has one candidate for each cell of grids with strides 8, 16 and 32, v5 has
   // three. Any other output is taken to have more candidates than values. (An export with NMS, 1 x
-  // N x 6, looks like v5's.) Null and one line in *error: not an ONNX network, not for this input,
-  // not of this output, boxes not in pixels, or a different number of classes.
+  // N x 6, looks like v5's.) Null and one line in *error: not an ONNX network, another input or
+  // output, boxes not in pixels, or a different number of classes.
   [[nodiscard]] static std::unique_ptr<NetworkDetector> load(const std::string& model,
                                                              const NetworkOptions& options,
                                                              std::string* error);

@@ -1,7 +1,7 @@
 #pragma once
 // join_target_pieces(): a target that is large for its speed changes the picture only along its
-// outline, because its even inside covers itself in the earlier pictures. So pieces of the
-// outline are found around an unchanged inside. In at least one piece, most changed pixels have the
+// outline: its inside, of one grey level, covers itself in the earlier pictures. So pieces of the
+// outline are found around an unchanged inside. In at least one piece most changed pixels have the
 // grey level of the inside. Two boxes are of one thing if
 //   |g - m| < c / 3   for three quarters of the pixels between the boxes, and
 //   |g - m| < c / 2   for most changed pixels of one of the boxes

@@ -1,12 +1,12 @@
 #pragma once
 // fit_plane(): the ground plane from any mix of data (plane_evidence.h) by least squares, with
 // covariance and each datum's misfit; or a refusal with its reason. Allocates; some milliseconds.
-// The covariance of (xi, p) is first order; it grows by chi-square per degree of freedom if that is
+// The covariance of (xi, p) is first order. It grows by chi-square per degree of freedom if that is
 // beyond chance (1 in 1000). A misfit is sqrt(r^T Q^+ r / rank), Q the covariance of the residual r
 // after the fit (Baarda's data snooping); 1 is expected. kMisfit names the datum without which the
 // others agree best. The weakest direction of the information shows what the data leave open. If
-// data fit either way up, as points of the horizon do, the base's down axis is taken to be below
-// the horizontal.
+// the data fit either way up, as points of the horizon do, the base's down axis is taken to be
+// below the horizontal.
 
 #include <optional>
 #include <string>

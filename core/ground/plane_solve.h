@@ -3,9 +3,9 @@
 //   sum r_i^T C_i^-1 r_i + |z|^2     over the plane's unknowns and the looks z (plane_residual.h)
 // The weights C_i^-1 depend on the plane. They are held during a step and renewed after it, so at
 // the end J^T C^-1 r = 0 for the C there.
-// All six of (xi, p) are unknown if data tie the camera to w. Otherwise w is the camera's
-// (world_plane.h): three are unknown, four with a known heading and no place, five with one known
-// place and no heading.
+// If data tie the camera to w, all six of (xi, p) are unknown. Otherwise w is the camera's
+// (world_plane.h), and three are unknown; four with a known heading and no place; five with one
+// known place and no heading.
 
 #include <Eigen/Core>
 #include <Eigen/Eigenvalues>
@@ -28,7 +28,7 @@ enum class PlaneFrame {
 
 struct PlaneProblem {
   const PlaneEvidence& evidence;
-  std::vector<Matrix3<double>> roots;
+  std::vector<Matrix3<double>> roots;  // rad; square root of each look's covariance
   PlaneFrame frame = PlaneFrame::kCamera;
   int left_out = -1;  // a datum that is ignored; -1: none
 

@@ -3,9 +3,9 @@
 //   descriptor   r_i = round(512 sqrt(s_i / sum s)), s SIFT's histogram. Euclidean distances of r
 //                are Hellinger distances of s (Arandjelovic, Zisserman 2012).
 //   place        in Alidade's pixels (core/model/lens/camera.h); OpenCV's are half a pixel less.
-//                OpenCV before 4.8, and later by default, places all features a quarter of a pixel
-//                off, as its doubled first image is. That is measured once on a blob at a known
-//                place and taken off.
+//                OpenCV doubles its first image. Before 4.8, and later by default, this moves all
+//                features by a quarter of a pixel. The shift is measured once, on a blob at a known
+//                place, and subtracted.
 // Batch work: allocates. One thread at a time.
 
 #include <array>

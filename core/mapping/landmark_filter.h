@@ -4,10 +4,9 @@
 //   y = G (u - project(R, f, d)),  G = (J_u_d B_d)^-1   innovation, rad, B_d = tangent_basis(d)
 //   cov_y = J_y_pose cov_pose J_y_pose^T + sigma^2 J_y_u J_y_u^T + P                     (eq. 8)
 //   K = P cov_y^-1,  d <- d (+) K y                                                      (eq. 9)
-// A landmark's error has an own part, P, and a part C common with its neighbours (scene_map.h),
-// which no number of pictures reduces. It follows a Schmidt filter: C <- M M^T + k S, M = (I - K)
-// C^1/2 + K Cp^1/2, k = trace(K) / 2. Derivation: docs/derivations.md. Pure; no allocation. Outputs
-// are written with kOk only.
+// An error of a landmark has its own part, P, and a part C common with its neighbours
+// (scene_map.h), which no number of pictures reduces and a Schmidt filter follows. Derivation:
+// docs/derivations.md. Pure; no allocation. Outputs are written with kOk only.
 
 #include "core/mapping/picture_motion.h"
 #include "core/model/lens/zoom_law.h"
@@ -20,7 +19,7 @@ struct PosedPicture {
   Camera<double> camera;
   CameraColumn<double> J_camera_log;  // d camera / d log f
   PictureMotion motion;
-  Matrix4<double> cov_pose = Matrix4<double>::Zero();  // (xi, log f)
+  Matrix4<double> cov_pose = Matrix4<double>::Zero();  // of (xi, log f): rad, 1
 };
 
 struct LandmarkSight {
@@ -54,10 +53,10 @@ enum class LandmarkUpdate {
   kSingular,    // no uncertainty at all; nothing is changed
 };
 
-// common: Cp. share_of_landmarks: share of the pose's covariance that comes from the landmarks' own
-// errors, 0 to 1; S is that share of it. news: > 0 to 1; share of what this picture shows that
-// earlier ones did not. A feature's error lasts as long as the light does, so the picture's
-// covariances are divided by news.
+// common: Cp, the common covariance of the landmarks that gave the pose. share_of_landmarks: share
+// of the pose's covariance that comes from the landmarks' own errors, 0 to 1. news: share of what
+// this picture shows that earlier ones did not, > 0 to 1. A feature's error lasts as long as the
+// light does, so the picture's covariances are divided by news.
 [[nodiscard]] LandmarkUpdate update_landmark(const LandmarkSight& sight,
                                              const Matrix2<double>& common,
                                              double share_of_landmarks, double news,

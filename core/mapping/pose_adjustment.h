@@ -2,9 +2,9 @@
 // Least squares of one picture's pose over presumed inliers, for picture_pose.cpp alone. Unknowns:
 // R and log f (with a mount pan, tilt, log f); if the motion during the read-out is not known, also
 // the turn w and the change of log f over the image's height.
-// Prior of w: the mount's axes turn at rates with a sigma in rad; turns about other axes have a
-// fiftieth of it. Without a mount each axis by itself. Where the motion is adjusted, knowledge is
-// in heights (in_heights()). Allocates; no shared state.
+// Prior of w: a turn about each of the mount's axes, with MotionDoubt's sigma; about any other axis
+// a fiftieth of that. Without a mount: about each axis of the camera. If the motion is adjusted,
+// `knowledge` is in heights (in_heights()). Allocates; no shared state.
 
 #include <optional>
 #include <vector>

@@ -1,11 +1,11 @@
 #pragma once
 // OneSidedClock: the line of a stream whose items are never early. Used by ClockFilter.
-// The line is the lower envelope of a sliding window. It contains the minimum delay. A step of that
-// (minimum_delay_step.h) beyond min_delay_step_s is subtracted from all later receive times: the
-// line continues, and its variance grows by the step's. While a rise is suspected, late items do
-// not count. Before the lock the line follows a fall. If fewer than kLeastOnLine items have come
-// down to the line before a rise, an early item had dragged it down: the line moves up instead, and
-// only items since the rise count.
+// The line is the lower envelope of a sliding window. It contains the minimum delay. A step of the
+// minimum delay (minimum_delay_step.h) beyond min_delay_step_s is subtracted from all later receive
+// times: the line continues, and its variance grows by the step's. While a rise is suspected, late
+// items do not count. Before the lock the line follows a fall. If fewer than kLeastOnLine items
+// have come down to the line before a rise, an early item had dragged it down: the line moves up
+// instead, and only items since the rise count.
 // Fixed memory, trivially copyable, no allocation, no exceptions. All times are host seconds.
 
 #include <algorithm>

@@ -2,9 +2,10 @@
 // Play (backlash) of width b between two angles: the driver d, and the angle that it drags.
 //   dragged = d - (b / 2) h,   h_i = clip(h_(i-1) + 2 (d_i - d_(i-1)) / b, -1, 1)
 // Encoder on the motor: the reading drives, the camera is dragged. Encoder behind the gear: the
-// camera drives, the reading is dragged. h is the state, unknown at first, anywhere in an interval.
-// Each movement narrows it, until it is a point once the driver moved by b in one direction. Angles in rad, any turn; differences go the short way round, so neighbours must be
-// less than half a turn apart. Plain values; no allocation.
+// camera drives, the reading is dragged. h is the state: at first anywhere in [-1, 1]. Each
+// movement narrows that interval.
+// A movement by b in one direction makes it known. Angles are rad, any turn. Differences go the
+// short way round, so neighbours must be less than half a turn apart. Plain values; no allocation.
 
 #include <algorithm>
 #include <cmath>
@@ -27,19 +28,19 @@ struct Play {
   [[nodiscard]] bool exists() const { return kind != PlayKind::kNone && width_rad > 0; }
 };
 
-// One of the two angles, as the other one tells it.
+// One of the two angles, computed from the other one.
 struct PlayedAngle {
-  double angle = 0;      // rad, the turn of the angle given
-  double sigma_rad = 0;  // from the state and the width
+  double angle = 0;      // rad, in the same turn as the given angle
+  double sigma_rad = 0;  // due to the state, the width and the noise
   int direction = 0;     // d angle / d b = -direction / 2 (dragged), direction / 2 (driver)
 };
 
-// The dragged angle as the driver tells it.
+// The dragged angle, computed from the driver's.
 class DraggedAngle {
  public:
   explicit DraggedAngle(const Play& play = {}) : play_(play) {}
 
-  // noise_rad: sigma of the driver's single values. Their peaks move the state, too.
+  // noise_rad: sigma of one value of the driver. Peaks of the noise move the state, too.
   [[nodiscard]] PlayedAngle next(double driver, double noise_rad = 0) {
     const double b = play_.width_rad;
     if (!(b > 0)) return {driver, 0, 0};
@@ -58,14 +59,14 @@ class DraggedAngle {
             std::sqrt(b * b / 4 * variance + by_width * by_width + by_noise * by_noise),
             half == 0 ? direction_ : 0};
   }
-  // From here on the state is unknown: samples were lost, or the head was switched off.
+  // The state is unknown from here on: samples were lost, or the head was switched off.
   void forget() { *this = DraggedAngle(play_); }
 
  private:
-  static constexpr double kClear = 3;  // sigmas; a movement that noise alone does not make
-  static constexpr double kPeak = 2;   // sigmas; of noise, that a resting state has seen
+  static constexpr double kClear = 3;  // sigmas; noise alone makes no larger movement
+  static constexpr double kPeak = 2;   // sigmas; peak of the noise that moved a resting state
 
-  // What is pushed out at one end of [-1, 1] gathers there.
+  // What is pushed beyond one end of [-1, 1] gathers at that end.
   void push(double by) {
     double* end = by > 0 ? &high_ : &low_;
     double* gathered = by > 0 ? &at_high_ : &at_low_;
@@ -93,13 +94,14 @@ class DraggedAngle {
   bool begun_ = false;
 };
 
-// The driver as the dragged angle tells it. Where that one stands still, the driver may be anywhere
-// within the play.
+// The driver, computed from the dragged angle. While that one stands still, the driver may be
+// anywhere within the play.
 class DrivingAngle {
  public:
   explicit DrivingAngle(const Play& play = {}) : play_(play) {}
 
-  // noise_rad: sigma of the dragged angle's single values. What noise can make is no movement.
+  // noise_rad: sigma of one value of the dragged angle. A movement that noise can make does not
+  // count.
   [[nodiscard]] PlayedAngle next(double dragged, double noise_rad = 0) {
     const double b = play_.width_rad;
     if (!(b > 0)) return {dragged, 0, 0};
@@ -109,7 +111,8 @@ class DrivingAngle {
     dragged_ = dragged;
     begun_ = true;
     if (pushes) return {dragged + direction_ * b / 2, play_.sigma_rad / 2, direction_};
-    // Either it still stands where it pushed, or it is on its way back: half-way is near both.
+    // Either the driver still stands where it pushed, or it is on its way back: half-way is near
+    // both.
     return {dragged + direction_ * b / 4, b / std::sqrt(12.0), 0};
   }
   void forget() { *this = DrivingAngle(play_); }
@@ -123,8 +126,8 @@ class DrivingAngle {
   bool begun_ = false;
 };
 
-// The true angle as readings tell it, for either kind. Readings less scale and error curve, each
-// once, in order.
+// The true angle, computed from readings, for either kind. Give each reading once, in order,
+// without scale and error curve.
 class PlayOfReadings {
  public:
   explicit PlayOfReadings(const Play& play = {})

@@ -19,12 +19,12 @@ namespace alidade {
 
 class StampCount {
  public:
-  static constexpr std::size_t kParts = 32;
-  static constexpr std::size_t kFewParts = 12;
-  static constexpr double kSteps = 6;
-  static constexpr double kApart_s = 3;
-  static constexpr double kNearApart_s = 1;
-  static constexpr double kNear = 0.06;
+  static constexpr std::size_t kParts = 32;     // s
+  static constexpr std::size_t kFewParts = 12;  // s
+  static constexpr double kSteps = 6;           // least rise, in steps
+  static constexpr double kApart_s = 3;         // least rise of any kind
+  static constexpr double kNearApart_s = 1;     // the same if it rises slowly
+  static constexpr double kNear = 0.06;         // s/s, largest slow rise
 
   void restart() { *this = StampCount(); }
 
@@ -80,12 +80,12 @@ class StampCount {
   [[nodiscard]] double step_s() const { return step_s_; }
 
  private:
-  static constexpr double kSame_s = 1.5e-4;
+  static constexpr double kSame_s = 1.5e-4;  // tolerance of the grid
   static constexpr double kLongestStep_s = 1;
-  static constexpr double kPart_s = 1;
-  static constexpr double kBack_s = 0.02;
+  static constexpr double kPart_s = 1;     // one part, of which the minimum counts
+  static constexpr double kBack_s = 0.02;  // a larger fall starts anew
   static constexpr double kStall_s = 0.5;
-  static constexpr double kOnStep = 0.15;
+  static constexpr double kOnStep = 0.15;  // of a step
   static constexpr std::size_t kLeastItems = 3;
 
   struct Part {

@@ -1,11 +1,11 @@
 #pragma once
-// What telemetry's angles are off by, besides scale and noise, learnt per axis:
+// Errors of telemetry's angles besides scale and noise, for each axis:
 //   measured = scale true + g(true) + play                              (play: play.h)
-// g is a curve over the true angle, Catmull-Rom between uniform knots, linear in the knots' values.
-// Beyond the knots it fades out: g = g(edge) e, e = exp(-d^2 / (2 length^2)) at d from the edge,
-// and its variance becomes unseen_sigma^2. Knots that fill a whole turn have no edge. Angles in
-// rad, any turn: wrapped here. g's slope must stay below the scale, so that the inverse
-// exists: validate(). Plain values in fixed memory; no allocation.
+// The curve g of the true angle is Catmull-Rom between uniform knots, linear in the knots' values.
+// At the distance d beyond the edge knot it fades: g = g(edge) e, e = exp(-d^2 / (2 length^2)), and
+// its variance becomes unseen_sigma^2. Knots that fill a whole turn have no edge. Angles are rad,
+// any turn; they are wrapped here. The slope of g must stay below the scale, so that the inverse
+// exists: see validate(). Plain values in fixed memory; no allocation.
 
 #include <algorithm>
 #include <array>
@@ -19,7 +19,7 @@
 
 namespace alidade {
 
-// g = sum of value[i] * values[knot[i]], its slope likewise. Outside all knots all are 0.
+// g = sum of value[i] * values[knot[i]]; its slope likewise. Without knots all are 0.
 struct CurveWeights {
   std::array<int, 4> knot{};
   Vector4<double> value = Vector4<double>::Zero();
@@ -38,7 +38,7 @@ struct AngleErrorCurve {
   double length_rad = 0;                   // correlation length of what is left
   double unseen_sigma_rad = 0;             // of g where there is no knot
 
-  // False: exact, as far as is known.
+  // False: nothing is known of an error.
   [[nodiscard]] bool exists() const { return count > 0 || unseen_sigma_rad > 0; }
   [[nodiscard]] double extent_rad() const { return count > 1 ? (count - 1) * spacing_rad : 0; }
   // The last knot's neighbour is the first.
@@ -77,7 +77,7 @@ struct AngleErrorCurve {
     return out;
   }
 
-  // rad; *slope: dg / d true angle.
+  // g, rad; *slope, if not null: dg / d true angle.
   [[nodiscard]] double at(double true_angle, double* slope = nullptr) const {
     const CurveWeights w = weights(true_angle);
     double g = 0;
@@ -91,7 +91,7 @@ struct AngleErrorCurve {
     return g;
   }
 
-  // rad, one standard deviation of what at() leaves.
+  // rad, one standard deviation of the error that remains after at() is subtracted.
   [[nodiscard]] double sigma(double true_angle) const {
     if (count < 1) return unseen_sigma_rad;
     const Place at = place(true_angle);
@@ -208,7 +208,7 @@ struct TelemetryError {
   return scale * true_angle + error.at(true_angle);
 }
 
-// The inverse. rate_factor: true rate / measured rate there, if not null.
+// The inverse. *rate_factor, if not null: true rate / measured rate there.
 [[nodiscard]] inline double true_from_measured(double scale, const AngleErrorCurve& error,
                                                double measured, double* rate_factor = nullptr) {
   double angle = measured / scale;

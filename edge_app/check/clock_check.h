@@ -31,7 +31,7 @@ struct ClockReport {
   ClockCounters counters;  // without restarts at a reconnection
   double delay_shift_s = 0;
   std::optional<Spread> lateness_s;
-  // The same rate without the filter's prior, with its standard deviation: shows a broken clock.
+  // The rate without the filter's prior, less 1, with its standard deviation: shows a broken clock.
   std::optional<double> raw_rate_error;
   double raw_rate_sigma = 0;
   // False: the stamps are not times (see judge_clock()), and the items' times are their arrivals.

@@ -1,14 +1,12 @@
 #pragma once
-// FrameClock: the capture time of each frame of a live stream, and whether that time is known.
-// A frame may have waited for an unknown time before it arrived and was stamped: behind a relay or
-// a network that stood still, in a cache, or in the socket of this process. Its time comes from the
-// sender's clock, else from the sequence numbers, else from arrivals alone (receipt_clock.h,
-// uneven_arrivals.h). A driver's stamps (stamped_at) count beside sequence numbers only: a frame
-// that the numbers put elsewhere keeps its stamp. Time stamps that run at a wrong rate, or count
-// pictures, are left out.
-// wait_for_pace false (receive times that are not arrivals, or a recording read as a source):
-// CaptureClock alone. Derivation: docs/derivations.md.
-// Seconds. Fixed memory, no allocation, one thread.
+// FrameClock: the capture time of each frame of a live stream, and whether that time is known. A
+// frame may have waited for an unknown time before it arrived and was stamped: behind a relay or a
+// network that stood still, in a cache, or in the socket of this process. Its time comes from the
+// sender's clock, else from sequence numbers, else from arrivals alone (receipt_clock.h,
+// uneven_arrivals.h). Sequence numbers give way to the driver's stamp (stamped_at) of a frame that
+// they put elsewhere. Time stamps that run at a wrong rate, or count pictures, are left out.
+// wait_for_pace false (no arrivals, or a recording read as a source): CaptureClock alone. Seconds.
+// Fixed memory, no allocation, one thread. Derivation: docs/derivations.md.
 
 #include <algorithm>
 #include <cmath>
@@ -32,13 +30,13 @@ namespace alidade {
 struct FrameTime {
   ClockEstimate clock;
   bool known = true;   // false: clock.time_s may be late by any amount
-  bool of_use = true;  // false: it stays unknown even when the pace or the line is known
-  // Sum of the steps of the least delay. The receive time contains it, the line does not.
+  bool of_use = true;  // false: of no use for calibration, and later frames do not improve it
+  // s, sum of the steps of the least delay. The receive time contains it, the line does not.
   double delay_shift_s = 0;
-  // By how much frames leave the line. Included in clock.sigma_s; common to neighbouring frames.
+  // s, by how much frames leave the line. Included in clock.sigma_s; common to neighbouring frames.
   double off_line_s = 0;
   double wander_s = 0;  // the same if frames leave the line again and again, else 0
-  // At a restart or step of the clock: by how much the new line may differ from the old one,
+  // s, at a restart or step of the clock: by how much the new line may differ from the old one,
   // whether the delay or the stamps moved.
   double moved_s = 0;
   bool stamps_left_out = false;                 // the sender's stamps are not used: wrong rate

@@ -1,12 +1,11 @@
 #pragma once
-// UnevenArrivals: the capture times of a live stream of which only arrivals are known and whose
-// camera leaves pictures out, now and then or often. So its pictures do not measure time, as
-// receipt_clock.h assumes.
-// A picture that comes after more than the usual interval has waited for the excess at most, or
-// came behind a missing one. Its time is the middle of what is possible, and sigma covers it.
-// Ages beyond kLongest_s are unknown, as are those at a connection's beginning. What the next
-// pictures show: docs/derivations.md.
-// Seconds of the host's clock. Fixed memory, no allocation, one thread.
+// UnevenArrivals: the capture times of a live stream that is known by its arrivals only, and whose
+// camera leaves pictures out. So its pictures do not measure time; receipt_clock.h assumes that
+// they do. A picture that comes after more than the usual interval has waited for the excess at
+// most, or it follows a missing one. Its time is the middle of what is possible, and sigma covers
+// it. Ages beyond kLongest_s are unknown, as are those at a connection's beginning. What the next
+// pictures show: docs/derivations.md. Seconds of the host's clock. Fixed memory, no allocation, one
+// thread.
 
 #include <algorithm>
 #include <cmath>

@@ -1,13 +1,12 @@
 #pragma once
-// UtcLine: the age of pictures at a reconnection, where the sender's clock restarts, by the
+// UtcLine: the age of pictures after a reconnection, where the sender's clock has restarted, by the
 // sender's absolute clock (FrameStamp::sender_utc_s: ONVIF's capture time in each packet, or RTCP's
 // reports). Beyond PTCEE.
 //   before   host time = line(sender), sender = utc - ahead     as last seen on the old connection
 //   after    time = line(utc - ahead), late = receive - time
-// Only an age near zero, to kAgrees_s, is trusted, as an absolute clock may be set and reports may
-// be nonsense. Sigma includes `late`, the line's and the delays' own. When line and `ahead` are
-// used: docs/derivations.md.
-// Seconds. Fixed memory, no allocation, one thread.
+// Only an age near zero (kAgrees_s) is trusted: an absolute clock may be set, and reports may be
+// nonsense. Sigma includes `late`, the line's sigma and the delays' own. When line and `ahead` are
+// used: docs/derivations.md. Seconds. Fixed memory, no allocation, one thread.
 
 #include <cmath>
 #include <optional>

@@ -47,9 +47,9 @@ struct CalibrationConfig {
   // Device units; two zoom readings that differ by no more are one zoom. Empty: found from their
   // jitter (steady_zoom.h).
   std::optional<double> zoom_tolerance;
-  // s, one standard deviation: how much the delay of the links differs from that of the stored
-  // calibration's connection, as long as no movement has told it. Empty: LinkDelay::kOpenSigma_s.
-  // Set, with mode PT: no picture is decoded.
+  // s, one standard deviation of the links' delay against that of the connection for which the
+  // calibration was stored, until movement has shown the delay. Empty: LinkDelay::kOpenSigma_s. If
+  // it is set and the mode is PT, no picture is decoded.
   std::optional<double> clock_offset_sigma_s;
 };
 

@@ -171,9 +171,9 @@ void Pipeline::take_place(ThreadDuty duty) const {
   static_cast<void>(share_processor());
 }
 
-// In PT mode without pictures a record takes microseconds on each thread, and waking another processor takes longer.
-// So all threads on its way share one processor. At normal priority that is left to the kernel,
-// which knows the other load.
+// In PT mode without pictures, work on a record takes microseconds on each thread, and waking
+// another processor takes longer. So all threads on a record's way share one processor. At normal
+// priority this is left to the kernel, which knows the other load.
 bool Pipeline::share_processor() const {
   if (way_processor_ < 0 || ::sched_getscheduler(0) != SCHED_FIFO) return false;
   return apply_realtime({0, way_processor_, false}).warnings.empty();

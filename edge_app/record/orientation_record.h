@@ -50,12 +50,12 @@ struct OrientationRecord {
   PlainCalibration camera;  // the calibration in use
   // Device units: the reading that the pan/tilt source reported last. Empty: it reports no zoom.
   std::optional<double> zoom;
-  // s: how far the frame's middle row, looked up at time_s + clock offset, lies beyond the newest
-  // trusted angle of telemetry. max_extrapolation_s limits it. Negative: samples enclose the frame.
-  // Empty without a sample, and where time_s is.
+  // s, how far the frame's middle row, looked up at time_s + clock offset, lies beyond the newest
+  // trusted angle of telemetry; max_extrapolation_s at most. Negative: samples enclose the frame.
+  // Empty: there is no sample, or no time_s.
   std::optional<double> telemetry_age_s;
-  // The frame that tied the record to the scene map's base. Empty: the base is telemetry's, or there
-  // is no orientation.
+  // The frame that tied the record to the scene map's base. Empty: the base is telemetry's, or the
+  // record has no orientation.
   struct Localized {
     double age_s = 0;      // of that frame
     double sigma_rad = 0;  // that the tie adds to a direction: root mean square of pan and tilt

@@ -1,6 +1,6 @@
 #pragma once
-// CalibrationSchedule: when SelfCalibration does what. Times in s. Where it says "of data", they
-// count data; else they lie between two tries.
+// CalibrationSchedule: when SelfCalibration does what. Times in s. "of data": the span of the data
+// that the session holds, not the time that passes.
 
 namespace alidade {
 
@@ -13,7 +13,7 @@ struct CalibrationSchedule {
   double first_watch_s = 12;     // doubles up to ...
   double longest_watch_s = 600;  // ... this
   double store_retry_s = 60;     // after the disk refused a calibration
-  double zoom_arrives_s = 0.1;   // without a change: the zoom does not just pass by
+  double zoom_arrives_s = 0.1;   // without a change; before that the zoom may just pass by
   double zoom_settles_s = 0.5;   // before anything is adjusted
   double zoom_glitch_s = 0.2;  // a reading that differs for less is ignored; no movement is shorter
   double zoom_silence_s = 5;   // without a reading, if there were some

@@ -10,13 +10,13 @@ namespace alidade {
 class MessageList {
  public:
   void say(const std::string& line) { lines_.push_back(line); }
-  // Unless it is the line that was last said so.
+  // Unless it is the line that say_once() said last.
   void say_once(const std::string& line) {
     if (line == said_) return;
     said_ = line;
     say(line);
   }
-  // The next say_once() is said in any case.
+  // The next say_once() says its line in any case.
   void forget_said() { said_.clear(); }
 
   [[nodiscard]] std::vector<std::string> take() { return std::exchange(lines_, {}); }

@@ -1,7 +1,7 @@
 #pragma once
-// Publication: the calibration that the real-time thread has, or gets next, and what is known of
-// it: whether its clock offset holds, whether it was withdrawn, whether another one is wanted.
-// Allocates. One thread.
+// Publication: the calibration that the real-time thread has or gets next, and its state: whether
+// its clock offset holds, whether it was withdrawn, whether another one is wanted. Allocates. One
+// thread.
 
 #include <algorithm>
 #include <memory>
@@ -28,14 +28,14 @@ class Publication {
     is_withdrawn_ = false;
     is_fresh_wanted_ = false;
   }
-  // The present one is no longer believed. by: what is left of it. The stored one of its zoom is
-  // rejected.
+  // The present one is no longer believed. by: what replaces it, not calibrated. The stored one of
+  // its zoom is rejected.
   void withdraw(Object by) {
     if (present_->calibration.zoom) rejected_.push_back(*present_->calibration.zoom);
     present_ = next_ = std::move(by);
     is_withdrawn_ = true;
   }
-  // What is to be published; null: nothing. Once.
+  // What is to be published, once; null: nothing.
   [[nodiscard]] Object take_next() { return std::exchange(next_, nullptr); }
 
   [[nodiscard]] const Object& object() const { return present_; }
@@ -53,7 +53,7 @@ class Publication {
   [[nodiscard]] bool is_rejected(double zoom) const {
     return std::find(rejected_.begin(), rejected_.end(), zoom) != rejected_.end();
   }
-  // Calibrations of zooms that `fits` says are no longer rejected.
+  // Calibrations of the zooms for which `fits` is true are no longer rejected.
   template <class Fits>
   void accept(const Fits& fits) {
     rejected_.erase(std::remove_if(rejected_.begin(), rejected_.end(), fits), rejected_.end());

@@ -1,6 +1,6 @@
 #pragma once
-// StreamWatch: whether frames and telemetry are such that a camera can be calibrated with them:
-// neither lost nor silent, the video's delay steady, the telemetry young enough for the frames.
+// StreamWatch: are frames and telemetry good enough to calibrate a camera with them? Neither may be
+// lost or silent; the video's delay must be steady, and telemetry young enough for the frames.
 // Seconds of the host's clock. Allocates little. One thread.
 
 #include <optional>
@@ -28,9 +28,9 @@ class StreamWatch {
 
   // The latest receive time of either stream.
   [[nodiscard]] double now_s() const { return now_s_; }
-  // What must become better before anything is calibrated or withdrawn.
+  // What must become better before anything is calibrated or withdrawn; empty: nothing.
   [[nodiscard]] std::optional<CalibrationNeed> unsteady() const;
-  // The stream that does not come.
+  // The stream that does not come; empty: both come.
   [[nodiscard]] std::optional<CalibrationNeed> missing() const;
 
  private:

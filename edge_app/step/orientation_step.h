@@ -64,9 +64,9 @@ struct OrientationStepOptions {
   ZoomCurve zoom_curve;  // for other zooms; may be empty
   // s, one standard deviation: how much the delays of two connections usually differ.
   double minimum_delay_sigma_s = 5e-3;
-  // s, the same for a connection whose delay nobody has seen yet: see link_delay.h.
+  // s, the same for a connection whose delay nobody has seen yet (link_delay.h).
   double unseen_delay_sigma_s = LinkDelay::kOpenSigma_s;
-  // In PT mode: there are images, in which points are followed so that they tell that delay.
+  // In PT mode: there are images, and points are followed in them to find that delay.
   bool follow_turns = false;
 };
 
@@ -84,12 +84,12 @@ struct StepEvents {
   // From this frame on images exclude the focal length of the zoom reading.
   bool zoom_contradicted = false;
   double video_delay_wander_s = 0;  // s, by how much the delay wanders; 0: it does not
-  // From this frame on the sender's time stamps are left out, because they run at another rate than
-  // the pictures come: their rate less one.
+  // Set in the frame from which the sender's time stamps are left out, as they run at another rate
+  // than the pictures come: their rate less one.
   std::optional<double> stamps_left_out;
   bool stamps_count = false;  // those stamps count pictures
-  // From this frame on telemetry is looked up by so much later than the calibration says, s, as
-  // motion has shown; and one standard deviation.
+  // s, with one standard deviation. Set in the frame from which telemetry is looked up so much
+  // later than the calibration says, as motion has shown.
   std::optional<double> link_delay_s;
   double link_delay_sigma_s = 0;
 };
@@ -99,7 +99,7 @@ class OrientationStep {
   // Throws as make_oe_mode() does.
   explicit OrientationStep(const OrientationStepOptions& options);
 
-  // The connection that begins with the next frame has no backlog, as the frames after it show
+  // The connection that begins with the next frame has no backlog, as later frames show
   // (fresh_beginning.h).
   void expect_fresh_frames() { video_clock_.expect_fresh(); }
   void add_telemetry(const PanTiltSample& sample);
@@ -167,15 +167,15 @@ class OrientationStep {
   // Passes telemetry to OE mode for frames that were answered by extrapolation, once samples
   // enclose them.
   void settle_pending_frames();
-  // Telemetry's answer with what the delay of the link adds to its covariance.
+  // Telemetry's answer, with a covariance that includes the uncertain delay of the link.
   [[nodiscard]] QueryStatus ask_telemetry(double time_s, double time_sigma_s,
                                           InterpolatedPanTilt* out) const;
-  // What the frame added last shows of the head's motion, for the delay of the link.
+  // Gives the delay of the link what the frame added last shows of the head's motion.
   void show_motion();
   void show(const ImageAngles& image);
   // In PT mode: how the head has turned since the image before, by points that are followed.
   void follow_turn();
-  // Passes on that motion has told the delay of the link.
+  // Reports a delay of the link that motion has shown.
   void tell_delay(StepEvents* events);
   // Completes a record that has its time and telemetry's status. measured: null if there is none.
   // lens: the frame's, if it may differ from the calibration's; else null.
@@ -217,7 +217,7 @@ class OrientationStep {
   LinkDelay link_delay_;
   int delays_told_ = 0;          // of link_delay_, in events
   bool delay_was_open_ = false;  // at the frame before
-  double by_calibration_s_ = 0;  // s, telemetry clock but for link_delay_, of the frame added last
+  double by_calibration_s_ = 0;  // s, telemetry time without link_delay_, of the frame added last
   std::uint32_t shown_map_ = 0;  // OE mode's map by which images show angles
   ImageAngles shown_;            // by the last image that showed them
   bool has_shown_ = false;
@@ -226,7 +226,7 @@ class OrientationStep {
   PanTilt<double> measured_angle_;    // rad, telemetry's, of the frame added last
   Vector2<double> turn_rate_ = Vector2<double>::Zero();  // rad/s, true, of the last turn
   Vector2<double> mean_rate_ = Vector2<double>::Zero();  // rad/s, of shown_, over a while
-  // s: the part of a frame's time error that neighbouring frames share, but for link_delay_.
+  // s, the part of a frame's time error that neighbouring frames share, without link_delay_'s.
   double lasting_sigma_s_ = 0;
   RepeatedImages repeated_images_;
   SceneStart scene_start_;        // without telemetry

@@ -1,11 +1,11 @@
 #pragma once
 // RepeatedImages: which images of a stream repeat the one before exactly, although the camera had
 // turned.
-// An equal image counts as repeated if telemetry says that it should have moved by kMoved_px since
-// the first equal one, after kSigmas of telemetry's uncertainty are taken off; and for kMemory_s
-// after such an image. Why equal images alone show nothing: docs/derivations.md.
-// Seconds, px. Fixed memory, no allocation, one thread. Every kRowStep-th row is compared by
-// digest: 10 us at 1920x1080.
+// An equal image counts as repeated if the image should have moved by kMoved_px since the first
+// equal one, by telemetry less kSigmas of its uncertainty. For kMemory_s after that every equal
+// image counts. Why equal images alone show nothing: docs/derivations.md. Seconds, px. Fixed
+// memory, no allocation, one thread. Every kRowStep-th row is compared by digest: 10 us at
+// 1920x1080.
 
 #include <algorithm>
 #include <array>

@@ -1,9 +1,9 @@
 #pragma once
-// TelemetryIntake: pan/tilt samples as they come, with the time of their clock (capture_clock.h) or
-// of their poll, in a buffer that frames query (telemetry_buffer.h). It is emptied when the
-// connection or the clock restarts, or the times begin to be of the other kind. What the calibration
-// knows of the angles' error is taken out (telemetry_correction.h). Fixed memory; no allocation.
-// One thread.
+// TelemetryIntake: puts pan/tilt samples into a buffer that frames query (telemetry_buffer.h). A
+// sample's time comes from the clock of its stamps (capture_clock.h), else from its poll. The
+// buffer is emptied when the connection or the clock restarts, and when the times change from one
+// of these kinds to the other. Known errors of the angles are subtracted (telemetry_correction.h).
+// Fixed memory; no allocation. One thread.
 
 #include <array>
 #include <cstddef>
@@ -22,11 +22,11 @@ struct TelemetryIntakeOptions {
   ClockFilterOptions clock;
   // s, one standard deviation of a receive time that is used as the capture time.
   double stamp_sigma_s = 5e-3;
-  // Its period_sigma_s applies to filtered times only. resolution 0: what the readings show.
+  // Its period_sigma_s applies to filtered times only. resolution 0: found from the readings.
   TelemetryNoise noise;
   TelemetryLimits limits;
   // True: samples of stalled polls are left out, as nobody knows when they were true, unless a
-  // locked clock tells it.
+  // locked clock gives their time.
   bool leave_out_stalled = false;
 };
 
@@ -48,7 +48,7 @@ class TelemetryIntake {
     is_lost_ = true;
     correction_.forget_state();
   }
-  // From now on, and for the latest samples, the errors of these angles are known.
+  // Subtracts these errors of the angles from now on, and from the latest samples.
   void correct_by(const Mechanics<double>& mechanics, const TelemetryError& error);
   [[nodiscard]] bool is_lost() const { return is_lost_; }
 
@@ -69,12 +69,12 @@ class TelemetryIntake {
 
   [[nodiscard]] Samples empty(bool filtered) const;
   [[nodiscard]] bool is_stalled_poll(const PanTiltSample& sample);
-  // Corrects it and puts it into the buffer, which counts what it refuses (a duplicate, a value that
-  // is not finite); the records' sigma shows the effect.
+  // Corrects a sample and puts it into the buffer. The buffer counts the samples that it refuses (a
+  // duplicate, a value that is not finite); the records' sigma shows the effect.
   void store(const TelemetrySample& measured);
   // Fills the buffer anew with the latest samples as measured.
   void store_again();
-  // White noise of a quarter of a step or more dithers the readings: then the step does not matter.
+  // rad. White noise of a quarter of a step or more dithers the readings: the result is then 0.
   [[nodiscard]] double resolution_shown() const;
 
   TelemetryIntakeOptions options_;

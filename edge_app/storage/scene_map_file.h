@@ -1,12 +1,11 @@
 #pragma once
 // scene.map: the scene map on disk (core/mapping/scene_map.h), an SQLite database in WAL mode with
-// this program's application_id. Columns: scene_map_schema.h; numbers keep their bits; of a
+// this program's application_id. Columns: scene_map_schema.h. Numbers keep their bits; of a
 // covariance the upper half is kept. user_version is the format, 2. A map of format 1 is read and
 // updated as it is, and becomes format 2 when it is replaced. Each transaction is on disk when the
-// call returns (synchronous = FULL): after a power cut the map is as one of them left it, and none
+// call returns (synchronous = FULL). After a power cut the map is as one of them left it, and none
 // that returned is lost. Checksums of the rows, and their sum in the scene row, reveal what SQLite
-// does not notice: a changed bit, a lost row.
-// Not for the real-time thread.
+// does not notice: a changed bit, a lost row. Not for the real-time thread.
 
 #include <cstdint>
 #include <string>

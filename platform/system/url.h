@@ -16,7 +16,7 @@ struct Url {
   std::string user;      // decoded
   std::string password;  // decoded
   std::string bare;      // the URL without user and password; its query may hold some
-  std::string shown;     // bare without_secrets(); of what is no URL the part that may be shown
+  std::string shown;     // bare, without_secrets(); of a text that is no URL: what may be shown
 };
 
 // On false, text is not a URL, *error says so, and url->bare is url->shown.

@@ -1,11 +1,13 @@
 #pragma once
-// Recordings of cameras that depart from the model, one departure at a time and all at once: the rows of alidade_reality.
+// Recordings of cameras that depart from the model, one departure at a time and all at once: the
+// rows of alidade_reality.
 //
-// A film is told by the text of a configuration of the virtual camera (docs/simulator.md), drawn from the row and the seed:
-// lens, mount, clocks, path and where the photo lies by the seed alone, so that rows differ by their departures; and of the
-// departure its size (0.5 to 1.5 times the row's), signs, phases and periods. 640x360, 25 Hz, 12 s, f 10,670 px unless the
-// row says so; MJPEG of quality 90 unless the row is about a codec. What the camera is believed to be noisy by stands in
-// noise.yaml, which may be wrong: that is the row of a head with steps.
+// The configuration of the virtual camera (docs/simulator.md) describes a film. It is drawn from
+// row and seed. Lens, mount, clocks, path and the photo's place depend on the seed alone, so that
+// rows differ by their departures only. The departure's size (0.5 to 1.5 times the row's), signs,
+// phases and periods are drawn, too. A film has 640x360 px, 25 Hz, 12 s and f 10,670 px unless the
+// row changes them, and MJPEG of quality 90 unless the row is about a codec. noise.yaml states the
+// noise that the estimator is told. It may be wrong: the row of a head with steps tests that.
 
 #include <cstdint>
 #include <filesystem>
@@ -37,8 +39,9 @@ struct RealityFilm {
 [[nodiscard]] RealityFilm reality_film(const RealityRow& row, std::uint64_t seed,
                                        const std::filesystem::path& photos);
 
-// The folder of the recording: recording/ with the virtual camera's files, film.yaml with the configuration. Made unless the
-// cache has it with the same text. Several programs may ask at once. Throws std::runtime_error.
+// The folder of the recording: recording/ holds the virtual camera's files, film.yaml the
+// configuration. It is made unless the cache has one with the same text. Several programs may ask
+// at once. Throws std::runtime_error.
 [[nodiscard]] std::filesystem::path kept_film(const RealityFilm& film, const std::string& name,
                                               const std::filesystem::path& cache);
 

@@ -149,7 +149,8 @@ FrameError RealityTruth::frame_error(const FoundCalibration& found,
   const Vector3d true_ray =
       camera_.slope_at(middle.x(), middle.y(), time).homogeneous().normalized();
   const Vector3d truth = gauge.base * (camera_.world_from_camera_at(time) * true_ray);
-  // The estimate's lens at its own middle: distortion moves the ray by less than a part in a million.
+  // The estimate's lens at the picture's middle: distortion moves the ray by less than a part in a
+  // million.
   const Vector2d slope(-found.centre_offset.x() / found.focal_length,
                        -found.centre_offset.y() / (found.focal_length * found.aspect));
   const Matrix3d& R = orientation.R_base_from_camera;

@@ -1,18 +1,20 @@
 #pragma once
-// What alidade_reality measures with: a calibration and the records of a replay against the virtual camera's truth. Reads the
-// program's files on its own, so that any version of it can be judged.
+// The yardsticks of alidade_reality: a calibration and the records of a replay against the virtual
+// camera's truth. It has its own readers of the program's files, so that it can judge any version.
 //
-// Calibration: e = truth - estimate of the kJudged parameters and their covariance C; e' C^-1 e / 8.
-// Frame: where the picture's middle looks, at the frame's time (row 0): e = truth - estimate along the picture's u and v,
-// their covariance C from that of the orientation; e' C^-1 e / 2 is "error^2 / sigma^2" here.
+//   calibration   e = truth - estimate of the kJudged parameters, C its covariance: e^T C^-1 e / 8
+//   frame         e = truth - estimate of where the picture's middle looks at the frame's time
+//                 (row 0), along u and v; C from the orientation's covariance: e^T C^-1 e / 2
 // Conventions of the truth:
-//   focal length    where it breathes: its mean over the film
-//   clock offset    of the earliest stamps (docs/simulator.md): play, steps and noise reduction leave it as it is
-//   base            where the telemetry's zero is if its gear had no error: an estimator that cannot know that says so in its
-//                   sigmas. `relative` errors have one common rotation of the base taken out
-//   optical centre  an estimate that has none has its camera frame through the middle of the picture: the truth is then told
-//                   in that camera frame and in the base that belongs to it
-//   mast            directions are the world's
+//   focal length    its mean over the film if it breathes
+//   clock offset    of the earliest stamps (docs/simulator.md); play, steps and noise reduction do
+//                   not change it
+//   base            where the telemetry's zero would be without the gear's error. An estimator that
+//                   cannot know this must say so in its sigmas. `relative` errors are without one
+//                   common rotation of the base
+//   optical centre  without an estimate of it the camera frame goes through the picture's middle;
+//                   the truth is converted to that camera frame and to the base that belongs to it
+//   mast            directions are in the world
 
 #include <Eigen/Core>
 #include <array>
@@ -28,7 +30,8 @@
 
 namespace alidade::test {
 
-// By the names of calibration.yaml's covariance. Axes: rad, in the tangent basis of the estimate (PTCEE 9).
+// The names in calibration.yaml's covariance. Axes: rad, in the tangent basis of the estimate
+// (PTCEE 9).
 inline constexpr std::array<const char*, 8> kJudged = {
     "focal_length", "radial_distortion", "line_delay",  "pan_axis_0",
     "pan_axis_1",   "tilt_axis_0",       "tilt_axis_1", "clock_offset"};
@@ -112,13 +115,17 @@ struct CalibrationStatistics {
 inline constexpr double kBeyondSigmas = 4.5;
 [[nodiscard]] CalibrationStatistics calibration_statistics(const std::vector<SeedResult>& seeds);
 
-// Mean, ratio and root mean squares of frames in OE mode; the worst of all frames.
+// Of the frames in OE mode, unless stated.
 struct ReplayStatistics {
-  int frames = 0, answered = 0, oe = 0;
-  double nees = 0, worst = 0;
-  double sigma_over_error = 0;
-  double rms_px = 0, relative_px = 0;
-  double pt_nees = 0;  // of the frames in PT mode
+  int frames = 0;               // all
+  int answered = 0;             // with an orientation, in any mode
+  int oe = 0;                   // in OE mode
+  double nees = 0;              // mean of e^T C^-1 e / 2
+  double worst = 0;             // the largest of these, in any mode
+  double sigma_over_error = 0;  // median sigma_px over rms_px
+  double rms_px = 0;            // of e
+  double relative_px = 0;       // rms of e without a common rotation
+  double pt_nees = 0;           // of the frames in PT mode
 };
 [[nodiscard]] ReplayStatistics replay_statistics(const std::vector<SeedResult>& seeds);
 
@@ -127,7 +134,8 @@ struct ReplayStatistics {
                                                     const ReplayStatistics& replay,
                                                     std::optional<double> most_relative);
 
-// Whether known errors give the known statistics, and sigmas of half the size are seen. One line says why not.
+// Checks the yardsticks: known errors must give the known statistics, and sigmas of half the size
+// must be noticed. Returns one line that says what is wrong; empty: nothing.
 [[nodiscard]] std::string yardsticks_fault();
 
 }  // namespace alidade::test

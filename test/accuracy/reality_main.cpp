@@ -1,8 +1,12 @@
-// alidade_reality: how honest and how accurate calibration and OE mode are where the camera departs from the model.
+// alidade_reality: how honest and how accurate calibration and OE mode are if the camera departs
+// from the model.
 //   alidade_reality [--rows gear,play] [--seeds N] [--seed S] [--cache DIR] [--json FILE]
-// For each row (reality_film.h) and seed a film of the virtual camera; `alidade calibrate` and `alidade replay --mode OE` on
-// it; both against the truth (reality_judge.h).
-// Exit status: 0 all marks are met, 1 some are not (listed last; 0 with --measure), 2 something could not be run.
+//                   [--measure]
+// For each row (reality_film.h) and seed: makes a film with the virtual camera, runs `alidade
+// calibrate` and `alidade replay --mode OE` on it, and compares both with the truth
+// (reality_judge.h).
+// Exit status: 0 all marks are met, 1 some are not (listed last; 0 with --measure), 2 something
+// could not be run.
 
 #include <fmt/format.h>
 

@@ -2,11 +2,12 @@
 // What moves by itself in the picture: a deck of clouds that drifts as one, and water whose waves
 // go all ways.
 //
-// Both are fields over azimuth and elevation, without end. Clouds cover, softly, where a field of
-// about `size` lies above the height that `fraction` of it exceeds; the field, and the texture on
-// it, drift at one rate. Water lies below an elevation; its grey is a sum of waves from `size` down
-// to a few pixels, a quarter of each going right, up, left and down. Sizes and rates in pixels are
-// those at the longest focal length. at() is thread-safe and does not allocate.
+// Both are boundless fields over azimuth and elevation. Clouds cover, softly, the places where a
+// field with details of about `size` lies above the height that `fraction` of it exceeds. The
+// field, and the texture on it, drift at one rate. Water lies below an elevation. Its grey is a sum
+// of waves from `size` down to a few pixels, a quarter of each going right, up, left and down.
+// Sizes and rates in pixels are those at the longest focal length. at() is thread-safe and does not
+// allocate.
 
 #include <Eigen/Core>
 #include <array>

@@ -73,8 +73,8 @@ struct PathConfig {
   double period = 10;        // s
   double stop = 0.5;         // s of rest after each move of a sweep
   double pan = 0, tilt = 0;  // rad, the centre
-  double focal_length =
-      0;  // px, whose fields of view are meant; 0: the camera's, with a zoom the longest of its path
+  // px, whose fields of view are meant; 0: the camera's, with a zoom the longest of its path.
+  double focal_length = 0;
   std::filesystem::path file;
 };
 
@@ -226,14 +226,15 @@ struct LiveConfig {
   int rtp_port = 0;
   std::filesystem::path sdp_file;  // of the plain RTP stream
   std::string user, password;      // of RTSP and HTTP; empty: no login
-  // Besides: the pictures as MJPEG over HTTP, ONVIF, and a head that is asked. Ports: 0: any free one.
+  // Also: the pictures as MJPEG over HTTP, ONVIF, and a head that is asked. Ports: 0: any free one.
   std::optional<int> mjpeg_port, onvif_port;
   enum class Link { kSerial, kTcp, kUdp };
   const HeadModel* head = nullptr;  // of kHeadModels; null: none
   Link head_link = Link::kSerial;
 };
 
-// A printed pattern before a camera held by hand, in place of a scene and a head (pattern_board.h, pattern_camera.h).
+// A printed pattern before a camera held by hand, in place of a scene and a head (pattern_board.h,
+// pattern_camera.h).
 struct PatternConfig {
   enum class Kind { kChessboard, kCircles, kSymmetricCircles, kAprilGrid, kCharuco };
   struct Lens {

@@ -1,5 +1,6 @@
 #pragma once
-// One mapping of a strictly checked YAML file: its keys with their units and ranges. Throws ConfigError, with file and line.
+// One mapping of a strictly checked YAML file: its keys with their units and ranges. Throws
+// ConfigError, with file and line.
 
 #include <yaml-cpp/yaml.h>
 

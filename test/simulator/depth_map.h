@@ -1,14 +1,12 @@
 #pragma once
 // How far away a patch's places are, and what a pupil off the axes' crossing sees of them.
 //
-// The place that is in direction d from where the axes meet stands at distance D(d) from there. D
-// is one number, or goes between nearest and farthest as the place's own smooth noise does, by
-// ratio; or it has so many layers. A ray p + s r (pupil p, unit vector r, both in the patch's
-// frame) meets the sphere of radius D where s D^-1 = t, t = sqrt(1 - e^2 + (e r)^2) - e r,
-// e = p / D: the direction seen is r + e / t. Smooth: D of the direction that is found, over and
-// over until it stays (the shift must be smaller than what D changes over). Layers: the nearest one
-// that the ray meets where that layer or a nearer one is; behind a nearer one's edge its own
-// picture goes on. Thread-safe, no allocation.
+// The place in direction d from where the axes meet is at the distance D(d) from there. D is one
+// number, goes smoothly between nearest and farthest (by ratio), or has a number of layers. In the
+// patch's frame a ray p + s r (pupil p, unit vector r) meets the sphere of radius D at s = D t and
+// sees the direction r + e / t, with
+//   e = p / D,   t = sqrt(1 - e^2 + (e r)^2) - e r
+// D depends on that direction: how it is found is in docs/simulator.md. Thread-safe, no allocation.
 
 #include <Eigen/Core>
 #include <algorithm>

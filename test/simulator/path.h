@@ -1,17 +1,17 @@
 #pragma once
 // The true pan and tilt angle at any time: the path the virtual camera follows.
 //
-// at() is a smooth closed form that can be asked at any moment, so that every row of every frame and
-// every telemetry sample gets the angle of its own time. Angles are rad, unwrapped (they may pass pi);
-// time is seconds of the simulation (0 = start of the first frame). Thread-safe, no allocation in at().
+// at() is a smooth closed form for any moment, so that every row of every frame and every telemetry
+// sample gets the angle of its own time. Angles are rad, unwrapped (they may pass pi); time is
+// seconds of the simulation (0 = start of the first frame). Thread-safe, no allocation in at().
 //
 // s = horizontal field of view, a = amplitude, T = period:
-//   triple_cosine  pan = a 9 s sin(2 pi t / T) / (2 pi), tilt = -a 3 s cos(6 pi t / T) / (2 pi), the
-//                  "triple infinity" of the PTCEE paper
-//   sweep          round a rectangle 3 a s wide and a s high: right, up, left, down, one quarter of T
+//   triple_cosine  pan = a 9 s sin(2 pi t / T) / (2 pi), tilt = -a 3 s cos(6 pi t / T) / (2 pi):
+//                  the "triple infinity" of the PTCEE paper
+//   sweep          round a rectangle 3 a s wide and a s high: right, up, left, down, a quarter of T
 //                  each, the last stop_s of each quarter at rest
 //   jerky          quick moves with rests between random points of that rectangle; repeats after T
-//   csv            columns time_s, pan_rad, tilt_rad (a truth.csv will do), cubic Hermite in between
+//   csv            columns time_s, pan_rad, tilt_rad (a truth.csv will do), cubic Hermite
 
 #include <memory>
 

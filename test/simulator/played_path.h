@@ -5,12 +5,11 @@
 //   y = play(x; b)   y stands still while x stays within b / 2 of it, and else is dragged along at
 //                    that distance
 //
-// Encoder on the motor: the path given is the motor's, which the encoder sees; the camera is
-// dragged, and stands still while the reading crosses b. Encoder on the output: the path given is
-// the camera's; the reading is dragged. The state begins in the middle, where a path that does not
-// repeat begins; on one that repeats it is that of any later round. It is kept at each millisecond
-// (of hours, less often) and exact between two but for a turn-about there: no more than
-// acceleration * step^2 / 8.
+// Encoder on the motor: the given path is the motor's, which the encoder sees; the camera is
+// dragged. Encoder on the output: the given path is the camera's; the reading is dragged. The state
+// begins in the middle; on a path that repeats it is that of any later round. It is kept at each
+// millisecond (of hours, less often) and exact in between, except at a turn-about: the error is at
+// most acceleration * step^2 / 8.
 
 #include <cstddef>
 #include <memory>

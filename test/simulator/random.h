@@ -1,9 +1,9 @@
 #pragma once
 // Randomness of the virtual camera: one seed, independent streams.
 //
-// Every noise has a stream of its own, so that changing one (say, the frame loss) leaves the draws of
-// the others as they were. Pixel noise is counter based: it depends on (seed, frame, row) alone, hence
-// not on which thread renders which frame.
+// Every noise has its own stream, so that changing one (say, the frame loss) leaves the draws of
+// the others as they were. Pixel noise is counter based: it depends on (seed, frame, row) alone,
+// not on the thread that renders a frame.
 
 #include <cstdint>
 #include <random>

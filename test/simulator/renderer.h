@@ -2,16 +2,11 @@
 // Frames of the virtual camera, row by row: every row sees the scene with the orientation and the
 // lens of its own time, evaluated on the true path.
 //
-// A pixel's signal is the mean over its area and its exposure: sub-exposures spread evenly over the
-// exposure, each with the orientation of its own moment and at a point of the pixel of its own:
-// four if nothing moves by a pixel meanwhile, else eight or more, at most one pixel apart (up to
-// 64). Then, in grey levels (255 = white): vignetting 1 - a (r / r_corner)^2, brightness step, lens
-// cover, noise of variance shot_noise * signal + read_noise^2, rounding and clipping to 8 bits.
-// Boil moves each pixel's ray by a random field, smooth in space (about a tenth of the image) and
-// time (about a quarter of a second), of zero mean and the standard deviation asked for. With a
-// length L or a time T of its own it is correlated as exp(-distance^2 / 2 L^2) or
-// exp(-t^2 / 2 T^2): a sum of waves whose numbers are drawn from that one's spectrum. render() is
-// thread-safe, and what it makes depends on its arguments only.
+// A pixel's signal is the mean over its area and its exposure. Then, in grey levels (255 = white):
+// vignetting 1 - a (r / r_corner)^2, brightness step, lens cover, noise of variance shot_noise *
+// signal + read_noise^2, rounding and clipping to 8 bits. Boil moves each pixel's ray by a smooth
+// random field. Sub-exposures and boil: docs/simulator.md. render() is thread-safe, and its result
+// depends on its arguments only.
 
 #include <array>
 #include <cstdint>

@@ -2,15 +2,12 @@
 // The far scene around the virtual camera: patches on the sphere, the first in front.
 //
 // Order: clouds, water, moving objects, flat areas, photos, procedural patches, background. A patch
-// is centred on a direction (azimuth positive right, elevation positive up; in base, FRD: (cos e
-// cos a, cos e sin a, -sin e)), upright there, and mapped either rectilinearly (tangent plane) or
-// by longitude and latitude about its own centre. Borders are soft over one pixel. Each patch is
-// prepared at the density the camera needs (about 1.4 texels a pixel at the optical axis), over the
-// part that will be seen; under a zoom once for each doubling of the focal length, over what is
-// seen at about that one or a longer one, and what lies between two densities is made of both.
-// Brightness: 0 black, 1 white, linear. A patch with a distance is seen from the camera's pupil
-// (depth_map.h), and the nearer patch is in front of the farther one, whatever their order. shade()
-// is thread-safe and does not allocate.
+// with a distance is seen from the camera's pupil (depth_map.h), and a nearer patch is in front of
+// a farther one, whatever their order. A patch is centred on a direction (azimuth positive right,
+// elevation positive up; in base, FRD: (cos e cos a, cos e sin a, -sin e)), upright there, and
+// mapped rectilinearly (tangent plane) or by longitude and latitude about its own centre. Borders
+// are soft over one pixel. Brightness: 0 black, 1 white, linear. Texture densities:
+// docs/simulator.md. shade() is thread-safe and does not allocate.
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -38,14 +35,15 @@ struct Sight {
 
 class Scene {
  public:
-  // sights: one without zoom; with a zoom one for each doubling, the longest focal length first and the last one
-  // with all that is seen. Throws ConfigError: photo unreadable, or scene too large.
+  // sights: one without zoom; with a zoom one for each doubling of the focal length, the longest
+  // first, and the last one with all that is seen. Throws ConfigError: photo unreadable, or scene
+  // too large.
   Scene(const SceneConfig& config, const std::vector<Sight>& sights, bool zooms,
         std::uint64_t seed);
 
   // Adds to sum[i] the brightness along each ray (x[i], y[i], 1) of the camera frame, times weight.
-  // Neighbours in the arrays are neighbours in the image, a pixel apart. A NaN ray adds nothing. focal_length: of that moment, px.
-  // pupil: in the camera frame, m.
+  // Neighbours in the arrays are neighbours in the image, a pixel apart. A NaN ray adds nothing.
+  // focal_length: px, of that moment. pupil: m, in the camera frame.
   void shade(const Eigen::Matrix3d& base_from_camera, const Eigen::Vector3d& pupil, double time_s,
              double focal_length, const double* x, const double* y, std::size_t count, float weight,
              float* sum) const;
@@ -68,11 +66,12 @@ class Scene {
   void add_photo(const PatchConfig& config, const cv::Mat& photo, const std::vector<Sight>& sights,
                  double detail, std::uint64_t seed);
   void add_object(const PatchConfig& config, const cv::Mat& picture);
-  // The coarsest that is dense enough for pixels `spacing` apart and holds the box, all in patch coordinates; else the nearest.
+  // The coarsest layer that is dense enough for pixels `spacing` apart and holds the box, all in
+  // patch coordinates; else the nearest.
   [[nodiscard]] static std::size_t layer_for(const Patch& patch, double spacing,
                                              const Eigen::AlignedBox2d& box);
-  // From a layer and the next coarser one, so that nothing jumps where the one gives way to the other; level: of the former, that
-  // pixels are apart.
+  // From a layer and the next coarser one, so that nothing jumps between them. level: of the
+  // former, at which pixels are apart.
   [[nodiscard]] static float zoomed_sample(const Patch& patch, std::size_t layer, double level,
                                            const Eigen::Vector2d& point);
 

@@ -1,15 +1,14 @@
 #pragma once
-// What the virtual pan/tilt head reports: the angle that its encoder sees (with play not quite the
-// camera's: played_path.h), scaled, off by its gear, noisy, rounded, sometimes old.
+// What the virtual pan/tilt head reports: the angle that its encoder sees (played_path.h), scaled,
+// with its gear's error, noisy, rounded, sometimes old.
 //
 //   measured = round(wrap(scale * wrap(angle) + gear(angle) + N(0, sigma)) / quantum) * quantum
 //   gear(angle) = sum of amplitude * sin(2 pi angle / period + phase)         (PTCEE 17 without it)
 //
 // With internal_rate_hz the head refreshes its value at multiples of that period and repeats it in
-// between: the value is then up to one such period old, half of it on average, and so much is to be
-// added to the clock offset that an estimator finds. A stale repeat is the value of the sample
-// before. A zoom is told as zoom.h has it, with the angles of the same refresh. Angles are rad,
-// wrapped to [-pi, pi). Not thread-safe.
+// between. The value is then half a period old on average, by which the clock offset grows that an
+// estimator finds. A stale repeat is the value of the sample before. A zoom is told as in zoom.h,
+// with the angles of the same refresh. Angles are rad, wrapped to [-pi, pi). Not thread-safe.
 
 #include <cstdint>
 #include <optional>

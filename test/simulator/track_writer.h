@@ -1,10 +1,11 @@
 #pragma once
 // tracks.csv: where the landmarks of a made-up grid appear in each frame, with noise.
 //
-// Landmarks stand on a grid of azimuth and elevation over the whole sphere, `landmark_spacing` fields of view apart. Under a
-// zoom there are grids nested in one another, each twice as dense as the one before, the first for the shortest focal length of
-// the path. A frame shows the grid whose spacing is nearest to the one asked for, without the points that are in a grid
-// kLandmarkOctaves before it: what was a small detail at one end fills the image at the other. A landmark is one direction under one number at
+// Landmarks stand on a grid of azimuth and elevation over the whole sphere, `landmark_spacing`
+// fields of view apart. Under a zoom there are nested grids, each twice as dense as the one before,
+// the first for the shortest focal length of the path. A frame shows the grid whose spacing is
+// nearest to the one asked for, without the points of the grid kLandmarkOctaves before it: a small
+// detail at one end fills the image at the other. A landmark keeps its direction and number at
 // every zoom.
 
 #include <cstdint>

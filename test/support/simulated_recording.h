@@ -1,10 +1,11 @@
 #pragma once
-// What a turning camera would have seen: recordings with known truth, made without the model's code.
-// Landmarks on a grid of azimuth and elevation (multiples of field of view / 10), the published path
-//   pan = 9 s sin(2 pi t / 10) / (2 pi), tilt = -3 s cos(6 pi t / 10) / (2 pi), s the field of view (rad)
-// or any other, white noise on pixels, angles and stamps, one draw of each measured period. Each
-// landmark is projected at the row that sees it, found by bisection. Fixed seed, same recording;
-// disturbances draw from a generator of their own, so that all else stays the same with and without.
+// What a turning camera would have seen: recordings with known truth, made without the model's
+// code. Landmarks on a grid of azimuth and elevation (multiples of field of view / 10), the
+// published path or any other one,
+//   pan = 9 s sin(2 pi t / 10) / (2 pi), tilt = -3 s cos(6 pi t / 10) / (2 pi)   s: field of view
+// white noise on pixels, angles and stamps, one draw of each measured period. Each landmark is
+// projected at the row that sees it. Fixed seed, same recording. Disturbances draw from their own
+// generator, so that all else stays the same with and without them. Angles are rad.
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -188,8 +189,9 @@ inline bool pixel_at(const Simulation& s, const Eigen::Vector2d& angle, const Ei
   return true;
 }
 
-// The row whose exposure meets the landmark in it, and the column: where the landmark's row less the row that is exposed changes its
-// sign, by regula falsi (Illinois: Dowell, Jarratt 1971), as both are nearly straight.
+// The column and the row in which a landmark is seen: the row whose exposure meets it. That is
+// where landmark's row - exposed row changes its sign. Both are nearly straight, so regula falsi
+// finds it (Illinois: Dowell, Jarratt 1971).
 inline bool rolling_pixel(const Simulation& s, double frame_time, const Eigen::Vector3d& d,
                           double* u, double* v) {
   constexpr double kAccuracy_px = 1e-11;

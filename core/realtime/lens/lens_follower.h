@@ -1,16 +1,13 @@
 #pragma once
-// LensFollower: the lens of each frame, once it differs from the one the map began with: what the
-// reading gives, what is expected before landmarks are found, what these show, and the calibration
-// of the answer. Order of calls:
-//   begin_frame()          takes the zoom reading, if there is one
-//   follow()               the lens leaves the map's; followed until begin() or give_up()
-//   expect_after_last(), expect_by_reading()
-//                          from the previous frames (lens_track.h) or the reading; last call counts
-//   look_through()         sets the camera to find landmarks with
-//   learn()                takes what they showed
+// LensFollower: the lens of each frame once it has left the map's. It gives the camera that is
+// expected before landmarks are found, what they show, and the calibration of the answer. follow()
+// begins this, begin() or give_up() ends it. For each frame, in this order:
+//   begin_frame()        takes the zoom reading, if there is one
+//   expect_after_last(), expect_by_reading()   expect a camera; the last call counts
+//   look_through()       sets the camera to find landmarks with
+//   learn()              takes what they showed
 // log f is the one with which the map's landmarks fit at phi = 0 (lens_scale.h); the camera's f is
-// f exp(phi). Fixed memory; no allocation. One thread. Derivation: docs/oe_mode.md, "A lens that
-// moves".
+// f exp(phi). Fixed memory; no allocation. One thread. Derivation: docs/oe_mode.md.
 
 #include <cmath>
 #include <optional>

@@ -1,13 +1,12 @@
 #pragma once
 // LensScale: phi, the difference of log f from the map's calibration, as a lens does not return
-// exactly to its zoom curve (zoom_curve.h). Learnt with the map's offset g, which telemetry ties to
-// it. Landmarks and motions are stored at phi = 0; they change by S a per unit of phi.
+// exactly to its zoom curve (zoom_curve.h). It is learnt with the map's offset g, which telemetry
+// ties to it. Landmarks and motions are stored at phi = 0.
 //   the camera at phi: zoomed by phi (zoom_law.h); an exact distortion stays the same
 //   d / d phi = S a of all that has a Sensitivity S;  a: by_zoom() of the camera, 0 where exact
-// The calibration's error is a phi + e. g and phi are known up to a noise of their own plus their
-// sensitivity times e; e, of covariance `others`, is independent of that noise and of that of all
-// measurements. Once the lens has moved (lens_track.h), phi is the scale of the map's directions,
-// and a frame's camera has its own f times exp(phi): LensColumns. Plain values; no allocation.
+// The calibration's error is a phi + e, e of covariance `others`. The noises of g, phi and
+// measurements are independent of e. Once the lens has moved (lens_track.h), phi is the scale of
+// the map's directions, and a frame has its own f times exp(phi): LensColumns. Plain values.
 
 #include "core/model/calibration.h"
 #include "core/model/lens/zoom_law.h"

@@ -5,8 +5,8 @@
 //   judge_coarse()     coarse landmarks found or missed
 //   make()             landmarks where cells are empty (landmark_maker.h)
 //   retire_unproven()  handed-over ones that are not there
-// The calibration is the one that the landmarks are for; its lens is told by change_lens().
-// The constructor takes all memory; only state() allocates. One thread.
+// Every `calibration` is that of the landmarks; change_lens() announces another lens of it. The
+// constructor takes all memory; only state() allocates. One thread.
 
 #include <cstddef>
 #include <optional>

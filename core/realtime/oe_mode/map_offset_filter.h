@@ -1,13 +1,13 @@
 #pragma once
-// MapOffsetFilter: offset (pan, tilt) of the map against telemetry, a Kalman filter over all
-// telemetry; and the frames that wait for theirs.
+// MapOffsetFilter: a Kalman filter of the map's offset (pan, tilt) against all telemetry, and the
+// frames that wait for telemetry.
 //   base angle = map angle + offset
-// Extrapolated telemetry teaches nothing yet: its frame waits until telemetry encloses its time. Up
-// to kMaxPending frames wait; each is settled once, the oldest first. Without room the oldest is
-// dropped. Samples and landmarks that were used before count less, by variance_inflation(); errors
-// that go with the angle, by offset_cells.h. A learnt focal length (lens_scale.h) joins the filter:
-// (offset, phi). An innovation that contradicts offset and landmarks is rejected, see
-// contradicted(). Fixed memory; no allocation. One thread. Derivation: docs/oe_mode.md.
+// A frame with extrapolated telemetry waits until telemetry encloses its time; only then is
+// anything learnt from it. Up to kMaxPending frames wait; beyond that the oldest is dropped.
+// What the same samples, landmarks or angles showed before counts less (variance_inflation(),
+// offset_cells.h). A learnt focal length joins the filter: (offset, phi), see lens_scale.h. An
+// innovation that contradicts offset and landmarks is rejected. Fixed memory; no allocation. One
+// thread. Derivation: docs/oe_mode.md.
 
 #include <array>
 #include <cstddef>
@@ -22,7 +22,7 @@
 namespace alidade {
 
 struct MapOffsetOptions {
-  double drift = 1e-6;       // rad / sqrt(s), >= 0; of map against telemetry, by heat and gears
+  double drift = 1e-6;       // rad / sqrt(s), >= 0; of the map's offset, by heat and gears
   double lens_drift = 1e-7;  // 1 / sqrt(s), >= 0; of log f at rest, by heat
   // s, >= 0; correlation time of the common error of the landmarks in view.
   double shared_correlation_time_s = kSharedCorrelation_s;
@@ -59,6 +59,7 @@ struct MapOffset {
   return (sensitivity * calibration.covariance).cwiseProduct(sensitivity).rowwise().sum();
 }
 
+// The part of telemetry's error that depends on the angle, from measured to true units.
 [[nodiscard]] AngleError angle_error(const Mechanics<double>& mechanics,
                                      const InterpolatedPanTilt& telemetry);
 
@@ -122,7 +123,7 @@ class MapOffsetFilter {
   // used before is only partly new.
   [[nodiscard]] double inflation(const InterpolatedPanTilt& telemetry, double frame_time_s) const;
 
-  // Adds to telemetry what was learnt of its error that was not told.
+  // Adds to telemetry's covariance the error that was learnt beyond the one that telemetry states.
   void widen(const Calibration& calibration, InterpolatedPanTilt* telemetry) const;
   [[nodiscard]] bool has_learnt_error() const {
     return cells_[0].learnt_variance() > 0 || cells_[1].learnt_variance() > 0;
@@ -130,7 +131,7 @@ class MapOffsetFilter {
   void forget_error() {
     for (OffsetAxisCells& cells : cells_) cells.forget_error();
   }
-  // noise: rad^2, of telemetry's angles without that error.
+  // How the cells let telemetry's angles count. noise: rad^2, of the angles without that error.
   [[nodiscard]] AngleErrorShare share(const AngleError& error, const Vector2<double>& noise) const;
 
   // elapsed_s has passed, and the offset may have drifted.
@@ -142,7 +143,8 @@ class MapOffsetFilter {
              const AngleError& error = {});
   // A frame was answered with telemetry that was not extrapolated. False if nothing was learnt.
   bool learn(double frame_time_s, const OffsetInnovation& innovation);
-  // Telemetry contradicted the landmarks in a frame. Whether by its angle, the cells will show.
+  // Telemetry contradicted the landmarks in a frame. The cells keep it, as the error may depend on
+  // the angle.
   void note_contradiction(double frame_time_s, const OffsetInnovation& innovation);
   // A frame was answered, by anything.
   void note_answer(double frame_time_s) { answered_time_s_ = frame_time_s; }

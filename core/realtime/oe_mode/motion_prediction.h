@@ -2,9 +2,9 @@
 // MotionPrediction: the camera's motion in a frame before its image is used, from telemetry or,
 // without it, from the previous frame.
 // From telemetry: its angles and rates in true units, minus the map's offset. From the previous
-// frame: angle and rate, extrapolated; the covariance allows for an acceleration. Its
-// sigma is the smaller of acceleration_fields and InterpolatedPanTilt::acceleration_sigma.
-// No allocation. One thread.
+// frame: its angle and rate, extrapolated. The covariance then allows for an acceleration, whose
+// sigma is the smaller of acceleration_fields and InterpolatedPanTilt::acceleration_sigma. No
+// allocation. One thread.
 
 #include "core/model/calibration.h"
 #include "core/model/rolling_shutter.h"

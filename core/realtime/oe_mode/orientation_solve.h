@@ -1,13 +1,12 @@
 #pragma once
 // Solves the orientation of one frame from landmarks found in it, with telemetry as prior (PTCEE
 // 35, and beyond). Unknowns: x = (angle, rate, acceleration) of pan and tilt at the reference row,
-// map's frame; g = (pan, tilt) offset, base minus map. Priors: small accelerations; g from earlier
-// frames.
+// map's frame; g = (pan, tilt) offset, base minus map.
 //   found - predicted = J (dx_angle + t dx_rate + t^2/2 dx_acceleration) + noise, t the row's time
 //   telemetry's angle = x_angle + g,   its rate = x_rate
-// A learnt focal length adds phi (LensScale), a lens that has moved adds its own l (ZoomPrior). The
-// calibration is taken as exact; Sensitivity carries the dependence on it.
-// Pure functions; no allocation. Derivation: docs/oe_mode.md.
+// Priors: small accelerations, g from earlier frames. A learnt focal length adds phi (LensScale), a
+// lens that has moved its own l (ZoomPrior). The calibration counts as exact; Sensitivity carries
+// the dependence on it. Pure; no allocation. Derivation: docs/oe_mode.md.
 
 #include <array>
 
@@ -43,8 +42,9 @@ struct MotionPrior {
   Vector4<double> telemetry =
       Vector4<double>::Zero();  // measured minus (predicted + offset), true units
   Matrix4<double> telemetry_covariance = Matrix4<double>::Zero();
-  // rad^2, parts of telemetry_covariance: of an error that goes with the angle, and for what was
-  // said of it before. The innovation's covariance has neither.
+  // rad^2, parts of telemetry_covariance: that of an error that depends on the angle, and what is
+  // added for knowing that error from before (AngleErrorShare). The innovation's covariance has
+  // neither.
   Vector2<double> error_variance = Vector2<double>::Zero();
   Vector2<double> repeated_variance = Vector2<double>::Zero();
   Sensitivity<4> telemetry_sensitivity = Sensitivity<4>::Zero();

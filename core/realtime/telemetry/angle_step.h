@@ -1,5 +1,5 @@
 #pragma once
-// AngleStep: the step of which all readings of a head are multiples, as they come; nobody has to
+// AngleStep: finds the step of which all readings of a head are multiples, so that nobody has to
 // state it. Euclid's algorithm on the differences of successive readings: those of a continuous
 // angle soon have no common measure left. Plain values; no allocation. One thread.
 
@@ -12,6 +12,7 @@ namespace alidade {
 
 class AngleStep {
  public:
+  // rad, as measured, any turn. An angle that is not finite is ignored.
   void add(double pan, double tilt) {
     pan_.add(pan);
     tilt_.add(tilt);

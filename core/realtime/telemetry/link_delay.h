@@ -1,11 +1,12 @@
 #pragma once
-// LinkDelay: by how much telemetry comes later, against the pictures, than a calibration says.
+// LinkDelay: how much later telemetry comes, against the pictures, than the calibration says.
 //   telemetry(t + delay) = image(t) + constant
-// image(t): the mount's angles as the images show them, from any zero; t holds the calibration's
-// clock offset. Each sample is compared with them at every delay of a grid. The sums of squares
-// give the delay and its sigma once the mount has accelerated, then follow it. What is found must
-// explain two stretches of motion in a row before it replaces a delay that was believed.
-// Measured units, rad; s. Fixed memory, no allocation. One thread. Derivation: docs/clocks.md.
+// image(t): the mount's angles as the images show them, from any zero; t contains the calibration's
+// clock offset. Each sample is compared with them at every delay of a grid within kRange_s; a delay
+// beyond that is not found. The sums of squares give the delay and its sigma once the mount has
+// accelerated, and then follow it. A delay that was believed is replaced only by one that explains
+// two stretches of motion in a row. Measured units, rad; s. Fixed memory, no allocation. One
+// thread. Derivation: docs/clocks.md.
 
 #include <array>
 #include <cstddef>
@@ -25,29 +26,31 @@ struct ImageAngles {
 
 enum class LinkDelayState {
   kCalibrated,  // the calibration's offset is this connection's
-  kOpen,        // another connection: nothing has told the delay yet
-  kFound        // motion has told it
+  kOpen,        // another connection: nothing has shown its delay yet
+  kFound        // motion has shown the delay
 };
 
 class LinkDelay {
  public:
   static constexpr double kRange_s = 0.5;       // either way
-  static constexpr double kOpenSigma_s = 0.15;  // an even share of 0 to 0.5 s
+  static constexpr double kOpenSigma_s = 0.15;  // of a uniform distribution from 0 to 0.5 s
 
-  // angle_sigma: rad, of the white noise of a sample, > 0. connections_sigma_s: by how much the
-  // delays of two connections usually differ.
+  // angle_sigma: rad, of the white noise of a sample, > 0. connections_sigma_s: one standard
+  // deviation of the difference between the delays of two connections.
   LinkDelay(double angle_sigma, double connections_sigma_s);
 
   // The calibration's clock offset was found through this connection.
   void begin_calibrated();
-  // The connection is another one. sigma_s: of its delay, as long as motion has not told it.
+  // The connection is another one. sigma_s: of its delay, until motion shows it.
   void open(double sigma_s = kOpenSigma_s);
   // Another calibration is used, whose clock offset is larger by by_s and was found through yet
   // another connection. What is known of this connection's delay stays.
   void change_calibration(double by_s);
-  // The next image has nothing to do with those before.
+  // The angles of the next image do not continue those before.
   void break_images();
 
+  // Ignored: values that are not finite; a sample that is not later than the last one, or repeats
+  // its angles.
   void add(const TelemetrySample& sample);
   void add(const ImageAngles& image);
 
@@ -55,8 +58,7 @@ class LinkDelay {
   // s, to be added to the calibration's clock offset, and its standard deviation.
   [[nodiscard]] double delay_s() const { return delay_s_; }
   [[nodiscard]] double sigma_s() const { return sigma_s_; }
-  // Count of the delays that motion has told: 1 with the first, and 1 more with each that replaces
-  // it.
+  // Number of delays that motion has shown: 1 with the first, 1 more with each that replaced one.
   [[nodiscard]] int found() const { return found_; }
 
  private:

@@ -1,8 +1,9 @@
 #pragma once
-// TelemetryCorrection: takes what is known of the error of telemetry's angles (telemetry_error.h)
-// out of the samples, before they are interpolated, and says of interpolated angles what is left:
+// TelemetryCorrection: subtracts the known errors of telemetry's angles (telemetry_error.h) from
+// the samples before they are interpolated, and adds what remains to the covariance of interpolated
+// angles. phi is the true angle:
 //   corrected = scale phi,   phi = play(m),   scale m + g(phi) = measured
-// Samples in order of time; play's state goes with them. It is unknown at first and after each
+// Play has a state, so samples come in order of time. The state is unknown at first and after each
 // forget_state(). Fixed memory; no allocation. One thread.
 
 #include "core/model/telemetry_error.h"
@@ -19,11 +20,12 @@ class TelemetryCorrection {
                       double noise_rad);
 
   [[nodiscard]] bool exists() const { return exists_; }
-  // A sample that is older than one before does not move play's state.
+  // Values that are not finite stay as they are. A sample older than an earlier one does not move
+  // the state of the play.
   void correct(TelemetrySample* sample);
   // Samples were lost, or the head was switched off.
   void forget_state();
-  // Adds what is left to the covariance.
+  // Adds what remains of the error to the covariance.
   void add_left(InterpolatedPanTilt* measured) const;
 
  private:

@@ -45,8 +45,8 @@ struct InterpolatedPanTilt {
   PanTilt<double> rate;     // rad/s, measured units
   // Order: pan, tilt, pan rate, tilt rate.
   Matrix4<double> covariance = Matrix4<double>::Zero();
-  // rad^2, rad: the part of `covariance` that goes with the angle (telemetry_error.h), and its
-  // correlation length. 0: no such part is known.
+  // rad^2 and rad: the part of `covariance` that is an error depending on the angle
+  // (telemetry_error.h), and its correlation length. 0: no such part is known.
   Vector2<double> error_variance = Vector2<double>::Zero();
   Vector2<double> error_length = Vector2<double>::Zero();
   // (rad/s^2)^2, expected square of the acceleration (pan, tilt) near this time.

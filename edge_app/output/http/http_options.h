@@ -16,8 +16,8 @@ struct HttpLimits {
   // that holds most.
   int max_strangers = 128;  // connections that showed no token; all of them if no token is set
   int max_with_token = 64;
-  // Endless answers. Beyond that 503, unless another address holds at least two more than the
-  // client's: then that one loses one.
+  // Endless answers at the same time. One more gets 503, unless another address holds at least two
+  // more than the client's: then that address loses one.
   int max_streams = 32;
   std::size_t max_head_bytes = 8192;
   double head_timeout_s = 5;    // from the connection to the last byte of the head

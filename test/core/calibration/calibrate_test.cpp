@@ -7,6 +7,7 @@
 #include <limits>
 #include <random>
 
+#include "test/support/errors_in_sigmas.h"
 #include "test/support/simulated_recording.h"
 
 namespace alidade {
@@ -14,23 +15,11 @@ namespace {
 
 using test::calibration_error;
 using test::draw_base_simulation;
+using test::expect_within_sigmas;
 using test::simulate;
 using test::Simulation;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
-
-// One error in 1.5e5 of a Gaussian is larger; a test looks at some hundred.
-constexpr double kSigmas = 4.5;
-
-void expect_within_sigmas(const Simulation& s, const CalibrationResult& result) {
-  ASSERT_TRUE(result.ok()) << to_string(result.status) << ": " << result.message;
-  const auto error = calibration_error(s, result.calibration);
-  for (int i = 0; i < kParameterCount; ++i) {
-    const double sigma = std::sqrt(result.calibration.covariance(i, i));
-    EXPECT_LE(std::abs(error[i]), kSigmas * sigma + 1e-15)
-        << to_string(static_cast<Parameter>(i)) << ", seed " << s.seed;
-  }
-}
 
 Simulation small_simulation(std::uint64_t seed) {
   Simulation s;
@@ -47,17 +36,10 @@ TEST(Calibrate, ErrorsAreWhatItsCovarianceSays) {
     const Simulation s = draw_base_simulation(static_cast<std::uint64_t>(100 + run));
     const CalibrationResult result = calibrate(simulate(s));
     ASSERT_TRUE(result.ok()) << result.message << ", seed " << s.seed;
-    const auto error = calibration_error(s, result.calibration);
-    for (int i = 0; i < kParameterCount; ++i) {
-      const double variance = result.calibration.covariance(i, i);
-      if (variance > 0) nees[i] += error[i] * error[i] / variance;
-    }
+    nees += test::squares_in_sigmas(s, result.calibration);
   }
   // 99.99 % of chi-square with 12 degrees of freedom lie in (1.6, 40).
-  for (const Parameter p :
-       {Parameter::kFocalLength, Parameter::kRadialDistortion, Parameter::kLineDelay,
-        Parameter::kPanAxis0, Parameter::kPanAxis1, Parameter::kTiltAxis0, Parameter::kTiltAxis1,
-        Parameter::kClockOffset}) {
+  for (const Parameter p : test::kDecidedByData) {
     EXPECT_LT(nees[index(p)], 40) << to_string(p);
     EXPECT_GT(nees[index(p)], 1.6) << to_string(p);
   }
@@ -186,7 +168,7 @@ TEST(Calibrate, RoundedAnglesDoNotBiasTheFocalLengthOfANarrowField) {
     sum += error;
     squares += error * error;
   }
-  EXPECT_LE(std::abs(sum), kSigmas * std::sqrt(kRuns));
+  EXPECT_LE(std::abs(sum), test::kMostSigmas * std::sqrt(kRuns));
   // 99.99 % of chi-square with 12 degrees of freedom lie below 40.
   EXPECT_LT(squares, 40);
 }

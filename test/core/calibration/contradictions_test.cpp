@@ -7,6 +7,7 @@
 #include <random>
 #include <vector>
 
+#include "test/core/calibration/adjustment_minimum.h"
 #include "test/core/calibration/adjustment_scene.h"
 
 namespace alidade::internal {
@@ -56,30 +57,15 @@ PartStatistics scatter_of(double common) {
           of_part[static_cast<std::size_t>(part_at(sample.time_s - scene.state.shift_s))];
     }
     Adjustment adjustment(data, scene.priors, scene.fixed);
-    AdjustmentState state = scene.state;
-    Linearisation at;
-    Eigen::VectorXd x;
-    std::vector<Vector2<double>> x_landmark;
-    GlobalVector step = GlobalVector::Zero();
-    for (int k = 0; k < 2; ++k) {
-      adjustment.linearise(state, {}, &at);
-      EXPECT_TRUE(adjustment.solve(at, 0, &x, &x_landmark));
-      apply_step(x, x_landmark, &state);
-      step += x.tail<kGlobalCount>();
-    }
-    adjustment.linearise(state, {}, &at);
-    GlobalMatrix covariance;
-    double telemetry_unknowns = 0;
-    ReducedFactor factor;
-    EXPECT_TRUE(adjustment.covariance(at, &covariance, &telemetry_unknowns));
-    EXPECT_TRUE(adjustment.factorise(at, &factor));
+    const test::AdjustmentMinimum found = test::find_minimum(scene.state, 2, &adjustment);
     const std::vector<PartGrowth> growth =
-        part_growth(divisions, adjustment, state, at, factor).front();
-    const ContradictionCheck check = check_contradictions(divisions, adjustment, state, at, factor);
+        part_growth(divisions, adjustment, found.state, found.at, found.factor).front();
+    const ContradictionCheck check =
+        check_contradictions(divisions, adjustment, found.state, found.at, found.factor);
     mean.contradictions += check.worst.parameter >= 0 ? 1 : 0;
     for (int p = 0; p < kGlobalCount; ++p) {
       const PartGrowth& of_p = growth[static_cast<std::size_t>(p)];
-      const double square = step[p] * step[p] / covariance(p, p);
+      const double square = found.step[p] * found.step[p] / found.covariance(p, p);
       mean.squares[p] += square / kRecordings;
       mean.grown[p] += square / (1 + of_p.share * (std::max(of_p.ratio, 1.0) - 1)) / kRecordings;
       mean.ratio[p] += of_p.ratio / kRecordings;

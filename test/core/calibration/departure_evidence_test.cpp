@@ -29,8 +29,8 @@ std::vector<DeparturePart> all_parts() {
   return parts;
 }
 
-// Six readings of sigma 1 at each knot see the curve, the number with one sign or the other by turns,
-// and its rival with the opposite sign but for one reading in twelve.
+// Each knot has six readings of sigma 1. They see the curve, the number with alternating sign, and
+// its rival with the opposite sign except for one reading in twelve.
 Eigen::MatrixXd reading_columns() {
   Eigen::MatrixXd B = Eigen::MatrixXd::Zero(6 * kKnots, kKnots + 2);
   for (Eigen::Index i = 0; i < B.rows(); ++i) {

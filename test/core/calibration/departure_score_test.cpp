@@ -5,6 +5,7 @@
 #include <cmath>
 #include <vector>
 
+#include "test/core/calibration/adjustment_minimum.h"
 #include "test/core/calibration/adjustment_scene.h"
 
 namespace alidade::internal {
@@ -39,25 +40,13 @@ Planted plant(const Vector2<double>& theta) {
   for (auto& sample : data.telemetry) sample.measured[0] += theta[0] * of_telemetry(sample.time_s);
   for (auto& o : data.observations) o.u += theta[1] * of_picture(o.u);
   Adjustment adjustment(data, scene.priors, scene.fixed);
-  AdjustmentState state = scene.state;
-  Linearisation at;
   // Errors are so small that one step is the minimum.
-  adjustment.linearise(state, {}, &at);
-  Eigen::VectorXd x;
-  std::vector<Vector2<double>> x_landmark;
-  EXPECT_TRUE(adjustment.solve(at, 0, &x, &x_landmark));
-  apply_step(x, x_landmark, &state);
-  adjustment.linearise(state, {}, &at);
-  GlobalMatrix covariance;
-  double telemetry_unknowns = 0;
-  ReducedFactor factor;
-  EXPECT_TRUE(adjustment.covariance(at, &covariance, &telemetry_unknowns));
-  EXPECT_TRUE(adjustment.factorise(at, &factor));
-  std::vector<DepartureScore> scores(1, DepartureScore(2, at));
+  const test::AdjustmentMinimum found = test::find_minimum(scene.state, 1, &adjustment);
+  std::vector<DepartureScore> scores(1, DepartureScore(2, found.at));
   adjustment.visit(
-      state, at,
+      found.state, found.at,
       [&](const ObservationRow& row) {
-        // A displacement of what is seen, not of the projection at a row's time: A has no part in it.
+        // This displaces what is seen, not the projection at a row's time: A has no part in it.
         const AdjustmentObservation& o = scene.data.observations[row.index];
         scores[0].add(row, 1, of_picture(o.u) / o.sigma);
       },
@@ -66,8 +55,8 @@ Planted plant(const Vector2<double>& theta) {
                       Vector2<double>(of_telemetry(data.telemetry[row.index].time_s), 0)
                           .cwiseQuotient(row.sigma));
       });
-  DepartureScore::finish(factor, adjustment, &scores);
-  return {x.tail<kGlobalCount>(), scores[0]};
+  DepartureScore::finish(found.factor, adjustment, &scores);
+  return {found.step, scores[0]};
 }
 
 TEST(DepartureScore, FindsWhatIsPlanted) {

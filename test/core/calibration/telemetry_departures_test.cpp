@@ -7,17 +7,17 @@
 
 #include "core/calibration/calibrate.h"
 #include "test/core/calibration/adjustment_scene.h"
+#include "test/support/errors_in_sigmas.h"
 #include "test/support/simulated_recording.h"
 
 namespace alidade {
 namespace {
 
 using test::calibration_error;
+using test::expect_within_sigmas;
+using test::kMostSigmas;
 using test::simulate;
 using test::Simulation;
-
-// One error in 1.5e5 of a Gaussian is larger.
-constexpr double kMostSigmas = 4.5;
 
 Simulation dome(std::uint64_t seed) {
   Simulation s;
@@ -42,16 +42,6 @@ Simulation dome_with_play(std::uint64_t seed, bool encoder_on_motor) {
   return s;
 }
 
-void expect_calibrated_within_sigmas(const Simulation& s, const CalibrationResult& result) {
-  ASSERT_TRUE(result.ok()) << to_string(result.status) << ": " << result.message;
-  const auto error = calibration_error(s, result.calibration);
-  for (int i = 0; i < kParameterCount; ++i) {
-    const double sigma = std::sqrt(result.calibration.covariance(i, i));
-    EXPECT_LE(std::abs(error[i]), kMostSigmas * sigma + 1e-15)
-        << to_string(static_cast<Parameter>(i)) << ", seed " << s.seed;
-  }
-}
-
 void expect_curve_within_sigmas(const Simulation& s, int axis, const AngleErrorCurve& curve) {
   ASSERT_GT(curve.count, 10);
   // The outermost knots lie beyond what was visited.
@@ -70,7 +60,7 @@ TEST(TelemetryDepartures, FindNothingWhereThereIsNothing) {
     Simulation s = dome(1);
     s.angle_quantum_rad = quantum_deg * kPi / 180;
     const CalibrationResult result = calibrate(simulate(s));
-    expect_calibrated_within_sigmas(s, result);
+    expect_within_sigmas(s, result);
     EXPECT_FALSE(result.telemetry_error.exists());
   }
 }
@@ -79,7 +69,7 @@ TEST(TelemetryDepartures, LearnAGear) {
   for (const double amplitude : {2e-4, 1e-3}) {
     const Simulation s = dome_with_gear(2, amplitude);
     const CalibrationResult result = calibrate(simulate(s));
-    expect_calibrated_within_sigmas(s, result);
+    expect_within_sigmas(s, result);
     expect_curve_within_sigmas(s, 0, result.telemetry_error.pan);
     expect_curve_within_sigmas(s, 1, result.telemetry_error.tilt);
     EXPECT_NEAR(result.quality.telemetry_sigma_ratio, 1, 0.2);
@@ -90,7 +80,7 @@ TEST(TelemetryDepartures, LearnPlayOfEitherKind) {
   for (const bool encoder_on_motor : {true, false}) {
     const Simulation s = dome_with_play(3, encoder_on_motor);
     const CalibrationResult result = calibrate(simulate(s));
-    expect_calibrated_within_sigmas(s, result);
+    expect_within_sigmas(s, result);
     const PlayKind kind = encoder_on_motor ? PlayKind::kMotor : PlayKind::kOutput;
     const TelemetryError& error = result.telemetry_error;
     EXPECT_EQ(error.pan_play.kind, kind);
@@ -109,12 +99,13 @@ TEST(TelemetryDepartures, LearnGearAndPlayOfRoundedReadings) {
   s.pan_tilt_sigma = 1e-5;
   s.angle_quantum_rad = 0.01 * kPi / 180;
   const CalibrationResult result = calibrate(simulate(s));
-  expect_calibrated_within_sigmas(s, result);
+  expect_within_sigmas(s, result);
   EXPECT_EQ(result.telemetry_error.pan_play.kind, PlayKind::kMotor);
   EXPECT_GT(result.telemetry_error.pan.count, 10);
 }
 
-// Each error in its sigmas over recordings: 99.99 % of chi-square with 8 degrees of freedom lie in (0.7, 32).
+// Sum of (error / sigma)^2 over the recordings: 99.99 % of chi-square with 8 degrees of freedom lie
+// in (0.7, 32).
 TEST(TelemetryDepartures, LeaveParametersWithErrorsThatTheirSigmasSay) {
   constexpr int kRuns = 8;
   Eigen::Matrix<double, kParameterCount, 1> nees;
@@ -124,16 +115,9 @@ TEST(TelemetryDepartures, LeaveParametersWithErrorsThatTheirSigmasSay) {
     s.play_rad = {5e-4, 5e-4};
     const CalibrationResult result = calibrate(simulate(s));
     ASSERT_TRUE(result.ok()) << result.message << ", seed " << s.seed;
-    const auto error = calibration_error(s, result.calibration);
-    for (int i = 0; i < kParameterCount; ++i) {
-      const double variance = result.calibration.covariance(i, i);
-      if (variance > 0) nees[i] += error[i] * error[i] / variance;
-    }
+    nees += test::squares_in_sigmas(s, result.calibration);
   }
-  for (const Parameter p :
-       {Parameter::kFocalLength, Parameter::kRadialDistortion, Parameter::kLineDelay,
-        Parameter::kPanAxis0, Parameter::kPanAxis1, Parameter::kTiltAxis0, Parameter::kTiltAxis1,
-        Parameter::kClockOffset}) {
+  for (const Parameter p : test::kDecidedByData) {
     EXPECT_LT(nees[index(p)], 32) << to_string(p);
   }
   EXPECT_GT(nees[index(Parameter::kClockOffset)], 0.7);

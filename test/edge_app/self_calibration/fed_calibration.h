@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "edge_app/self_calibration/self_calibration.h"
+#include "test/support/errors_in_sigmas.h"
 #include "test/support/simulated_recording.h"
 
 namespace alidade::test {
@@ -164,10 +165,7 @@ inline void expect_truth(const Simulation& s, const Calibration& c) {
   const auto error = calibration_error(s, c);
   // 9 numbers of which chance takes 1 in 30,000 beyond: 99.97 %.
   constexpr double kBeyondChance = 4.2;
-  for (const Parameter p :
-       {Parameter::kFocalLength, Parameter::kRadialDistortion, Parameter::kLineDelay,
-        Parameter::kPanAxis0, Parameter::kPanAxis1, Parameter::kTiltAxis0, Parameter::kTiltAxis1,
-        Parameter::kClockOffset}) {
+  for (const Parameter p : kDecidedByData) {
     const double sigma = std::sqrt(c.covariance(index(p), index(p)));
     EXPECT_GT(sigma, 0) << to_string(p);
     EXPECT_LT(std::abs(error[index(p)]), kBeyondChance * sigma) << to_string(p);

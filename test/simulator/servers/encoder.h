@@ -3,11 +3,10 @@
 //
 // encode_jpeg makes what RFC 2435 can carry: baseline, standard Huffman tables, YUV 4:2:0 (type 1)
 // with grey chroma. VideoEncoder makes Annex B access units of H.264 or H.265 without delay (no B
-// frames, no look-ahead): the picture that went in comes out of the same call. An IDR with
-// parameter sets begins every second of frames unless stated, so a viewer can join within a second.
-// Luma is full range (0..255) in both. Row v of the picture starts at gray + v * stride (bytes).
-// Both allocate. encode_jpeg may be called from any thread; an VideoEncoder belongs to one at a
-// time.
+// frames, no look-ahead): the picture that went in comes out of the same call. Unless stated, an
+// IDR with parameter sets begins every second of frames, so that a viewer can join. Luma is full
+// range (0..255) in both. Row v starts at gray + v * stride (bytes). Both allocate. encode_jpeg is
+// for any thread, a VideoEncoder for one at a time.
 
 #include <cstddef>
 #include <cstdint>

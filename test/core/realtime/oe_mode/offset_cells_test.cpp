@@ -1,4 +1,5 @@
-// A head whose telemetry errs by angle: the map's offset is known as well as it can be, and no better.
+// If a head's telemetry errs by angle, the map's offset is known as well as it can be, and no
+// better.
 
 #include "core/realtime/oe_mode/offset_cells.h"
 
