@@ -19,6 +19,9 @@ using Eigen::VectorXd;
 // Finer ones bend more between two knots than the interpolation follows. Knots.
 constexpr double kShortestCurve = 1.5;
 constexpr double kShortestRipple = 5;
+constexpr double kLongestCurve = 2;  // of all knots
+// Of all knots. What turns more slowly is hardly more than a bend, which tells no period: a curve.
+constexpr double kLongestRipple = 1.25;
 
 MatrixXd ripple_root(const DeparturePart& part, double period) {
   MatrixXd root(part.count, 2);
@@ -183,12 +186,24 @@ DeparturePrior best_shape(const PartData& data, const DeparturePart& part,
   return best;
 }
 
+// Not one whose period would rather be longer.
+bool is_ripple(const DeparturePrior& prior, const DeparturePart& part) {
+  constexpr double kAtTheEdge = 0.99;
+  return prior.length < kAtTheEdge * kLongestRipple * static_cast<double>(part.count - 1);
+}
+
+// The curve on the same knots as a ripple.
+std::size_t curve_beside(const std::vector<DeparturePart>& parts, std::size_t ripple) {
+  std::size_t i = 0;
+  while (parts[i].shape != DepartureShape::kCurve || parts[i].first != parts[ripple].first) ++i;
+  return i;
+}
+
 DeparturePrior best_prior(const PartData& data, const DeparturePart& part) {
   constexpr double kCurveStep = 1.8;
   constexpr double kFinestCurve = 1.1;
   constexpr double kFinestRipple = 1.0001;
-  constexpr double kRippleStep = 0.25;    // in periods over all knots
-  constexpr double kLongestRipple = 1.5;  // of all knots: beyond, it is hardly more than a slope
+  constexpr double kRippleStep = 0.25;  // in periods over all knots
   std::vector<double> lengths;
   const auto knots = static_cast<double>(part.count - 1);
   switch (part.shape) {
@@ -198,16 +213,93 @@ DeparturePrior best_prior(const PartData& data, const DeparturePart& part) {
         lengths.push_back(lengths.back() * kCurveStep);
       }
       return best_shape(data, part, lengths, kCurveStep, kFinestCurve);
-    case DepartureShape::kRipple:
+    case DepartureShape::kRipple: {
       for (double periods = 1 / kLongestRipple; periods * kShortestRipple <= knots;
            periods += kRippleStep) {
         lengths.push_back(knots / periods);
       }
-      return best_shape(data, part, lengths, 1 + kRippleStep, kFinestRipple);
+      const DeparturePrior best = best_shape(data, part, lengths, 1 + kRippleStep, kFinestRipple);
+      return is_ripple(best, part) ? best : DeparturePrior{};
+    }
     case DepartureShape::kNumber:
       break;
   }
   return best_number(data);
+}
+
+// M = I + R^T S R
+MatrixXd joint_matrix(const MatrixXd& S, const MatrixXd& root) {
+  MatrixXd M = root.transpose() * S * root;
+  M.diagonal().array() += 1;
+  return M;
+}
+
+// Of all that a root describes, over nothing. *mean: of c.
+double log_evidence(const MatrixXd& S, const VectorXd& g, const MatrixXd& root, VectorXd* mean) {
+  const Eigen::LLT<MatrixXd> llt(joint_matrix(S, root));
+  const VectorXd z = root.transpose() * g;
+  const VectorXd x = llt.solve(z);
+  *mean = root * x;
+  return 0.5 * z.dot(x) - llt.matrixLLT().diagonal().array().log().sum();
+}
+
+// What the ripples' periods, which the evidence tells with an error of their own, add to the
+// covariance of c: D V D^T, D = d mean / d log period, V^-1 = -d^2 log evidence (Kass, Steffey 1989).
+MatrixXd covariance_of_periods(const MatrixXd& S, const VectorXd& g,
+                               const std::vector<DeparturePart>& parts,
+                               const std::vector<DeparturePrior>& priors, const MatrixXd& sure) {
+  constexpr double kLargest = 0.2;  // of log period
+  constexpr double kSmallest = 1e-4;
+  const Index rows = g.size();
+  MatrixXd out = MatrixXd::Zero(rows, rows);
+  std::vector<std::size_t> ripples;
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    if (parts[i].shape == DepartureShape::kRipple && priors[i].amplitude > 0) ripples.push_back(i);
+  }
+  const auto count = static_cast<Index>(ripples.size());
+  if (count == 0) return out;
+  VectorXd mean;
+  const auto evidence_at = [&](const VectorXd& log_change) {
+    std::vector<DeparturePrior> there = priors;
+    for (Index i = 0; i < count; ++i)
+      there[ripples[static_cast<std::size_t>(i)]].length *= std::exp(log_change[i]);
+    return log_evidence(S, g, joint_root(parts, there, sure, rows, parts.size()), &mean);
+  };
+  const double here = evidence_at(VectorXd::Zero(count));
+  // Steps at which the evidence falls by about 1/2.
+  VectorXd step(count);
+  MatrixXd D(rows, count);
+  MatrixXd bend(count, count);
+  for (Index i = 0; i < count; ++i) {
+    double second = 0;
+    step[i] = kSmallest;
+    for (;;) {
+      const double above = evidence_at(step[i] * VectorXd::Unit(count, i));
+      D.col(i) = mean;
+      const double below = evidence_at(-step[i] * VectorXd::Unit(count, i));
+      D.col(i) = (D.col(i) - mean) / (2 * step[i]);
+      second = 2 * here - above - below;
+      if (second >= 1 || step[i] >= kLargest) break;
+      step[i] *= 2;
+    }
+    bend(i, i) = std::max(second / (step[i] * step[i]), 1 / (kLargest * kLargest));
+  }
+  for (Index i = 0; i < count; ++i) {
+    for (Index j = 0; j < i; ++j) {
+      const VectorXd a = step[i] * VectorXd::Unit(count, i);
+      const VectorXd b = step[j] * VectorXd::Unit(count, j);
+      const double mixed =
+          evidence_at(a + b) + evidence_at(-a - b) - evidence_at(a - b) - evidence_at(b - a);
+      bend(i, j) = bend(j, i) = -mixed / (4 * step[i] * step[j]);
+    }
+  }
+  const Eigen::LLT<MatrixXd> llt(bend);
+  // Far from a maximum only what each period says for itself is certain.
+  const MatrixXd V = llt.info() == Eigen::Success
+                         ? MatrixXd(llt.solve(MatrixXd::Identity(count, count)))
+                         : MatrixXd(bend.diagonal().cwiseInverse().asDiagonal());
+  out = D * V * D.transpose();
+  return out;
 }
 
 }  // namespace
@@ -280,24 +372,76 @@ std::vector<DeparturePrior> choose_departures(const MatrixXd& information, const
   return priors;
 }
 
+void refine_departures(const MatrixXd& information, const VectorXd& score,
+                       const std::vector<DeparturePart>& parts, const MatrixXd& sure,
+                       std::vector<DeparturePrior>* priors) {
+  constexpr int kSweeps = 3;
+  constexpr double kStep = 1.02;
+  constexpr double kFinest = 1.0001;
+  for (int sweep = 0; sweep < kSweeps; ++sweep) {
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+      DeparturePrior& prior = (*priors)[i];
+      if (parts[i].shape != DepartureShape::kRipple || !(prior.amplitude > 0)) continue;
+      const PartData data = eliminate_others(
+          information, score, joint_root(parts, *priors, sure, score.size(), i), parts[i]);
+      const auto knots = static_cast<double>(parts[i].count - 1);
+      DeparturePrior best;
+      const auto try_length = [&](double length) {
+        const DeparturePrior there = best_amplitude(data, parts[i], length, prior.amplitude);
+        if (there.gain > best.gain) best = there;
+        return there.gain;
+      };
+      double length = prior.length;
+      double gain = try_length(length);
+      climb(kStep, kFinest, kShortestRipple, kLongestRipple * knots, try_length, &length, &gain);
+      if (best.gain > 0) prior = best;
+      if (is_ripple(prior, parts[i])) continue;
+      prior = {};
+      const std::size_t curve = curve_beside(parts, i);
+      if ((*priors)[curve].amplitude > 0) continue;
+      (*priors)[curve] = best_prior(
+          eliminate_others(information, score,
+                           joint_root(parts, *priors, sure, score.size(), curve), parts[curve]),
+          parts[curve]);
+    }
+  }
+}
+
+DeparturePrior possible_curve(const MatrixXd& information, const VectorXd& score,
+                              const std::vector<DeparturePart>& parts,
+                              const std::vector<DeparturePrior>& priors, const MatrixXd& sure,
+                              std::size_t part, double amplitude) {
+  constexpr double kStep = 1.3;
+  const PartData data = eliminate_others(
+      information, score, joint_root(parts, priors, sure, score.size(), part), parts[part]);
+  const double longest = kLongestCurve * static_cast<double>(parts[part].count - 1);
+  DeparturePrior best;
+  for (double length = longest; length >= kShortestCurve; length /= kStep) {
+    const MatrixXd root = curve_root(parts[part], length);
+    const double gain =
+        gain_of(root.transpose() * data.S * root, root.transpose() * data.g, amplitude);
+    if (best.amplitude > 0 && !(gain > best.gain)) continue;
+    best = {amplitude, length, gain};
+  }
+  return best;
+}
+
 DepartureFit fit_departures(const MatrixXd& information, const VectorXd& score,
                             const std::vector<DeparturePart>& parts,
                             std::vector<DeparturePrior> priors, const MatrixXd& sure) {
   DepartureFit fit;
   fit.priors = std::move(priors);
-  const MatrixXd root = joint_root(parts, fit.priors, sure, score.size(), parts.size());
   fit.mean.setZero(score.size());
   fit.covariance.setZero(score.size(), score.size());
+  const MatrixXd root = joint_root(parts, fit.priors, sure, score.size(), parts.size());
   if (root.cols() == 0) return fit;
-  const MatrixXd SR = information * root;
-  MatrixXd M = root.transpose() * SR;
-  M.diagonal().array() += 1;
   // P = R M^-1 R^T
-  const Eigen::LLT<MatrixXd> llt(M);
+  const Eigen::LLT<MatrixXd> llt(joint_matrix(information, root));
   const MatrixXd half = llt.matrixL().solve(root.transpose());
   fit.covariance = half.transpose() * half;
   fit.mean = fit.covariance * score;
   fit.unknowns = fit.covariance.cwiseProduct(information).sum();
+  fit.covariance += covariance_of_periods(information, score, parts, fit.priors, sure);
   return fit;
 }
 

@@ -59,7 +59,20 @@ inline constexpr double kLeastGain = 7;
                                                             const Eigen::MatrixXd& sure,
                                                             double least_gain = kLeastGain);
 
-// The posterior with these priors, and whatever else is in `sure`.
+// Raises the evidence by the A and L of the ripples that are present, near where they are.
+void refine_departures(const Eigen::MatrixXd& information, const Eigen::VectorXd& score,
+                       const std::vector<DeparturePart>& parts, const Eigen::MatrixXd& sure,
+                       std::vector<DeparturePrior>* priors);
+
+// A curve of a size that is known, with the likeliest length, whatever it gains.
+[[nodiscard]] DeparturePrior possible_curve(const Eigen::MatrixXd& information,
+                                            const Eigen::VectorXd& score,
+                                            const std::vector<DeparturePart>& parts,
+                                            const std::vector<DeparturePrior>& priors,
+                                            const Eigen::MatrixXd& sure, std::size_t part,
+                                            double amplitude);
+
+// The posterior with these priors, and whatever else is in `sure`. Ripples' periods have errors.
 [[nodiscard]] DepartureFit fit_departures(const Eigen::MatrixXd& information,
                                           const Eigen::VectorXd& score,
                                           const std::vector<DeparturePart>& parts,

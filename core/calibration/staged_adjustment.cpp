@@ -54,7 +54,7 @@ void StagedAdjustment::adjust_robustly() {
     replace_rounded_telemetry();
     settled_ = settle_robustly();
   }
-  settled_ = settle_departures() && settled_;
+  settled_ = settle_departures();
   adjustment_.linearise(adjusted_.state, {}, &adjusted_.at);
   mark_outliers();
 }
@@ -122,7 +122,7 @@ bool StagedAdjustment::settle_on_inliers() {
 bool StagedAdjustment::settle_departures() {
   constexpr int kMostRounds = 6;
   constexpr double kStays = 0.3;  // standard deviations
-  bool settled = true;
+  bool settled = settled_;
   for (int round = 0; round < kMostRounds; ++round) {
     const bool departs =
         departures_.estimate(selected_->data, adjusted_.state, adjusted_.at, true, &adjustment_);

@@ -95,17 +95,17 @@ bool TelemetryDepartures::estimate(const AdjustmentData& data, const AdjustmentS
   MatrixXd sure = claim();
   if (choose) {
     limit_amplitudes(data, state, at);
-    VectorXd certain(normal.g.size());  // 1 / ratio
-    for (const int axis : {0, 1}) {
-      const double ratio = white_noise_ratio(data, state, at, axis);
-      for (std::size_t part = curve_part(axis); part < curve_part(axis + 1); ++part)
-        certain.segment(parts_[part].first, parts_[part].count).setConstant(1 / ratio);
-    }
-    fit_.priors = choose_departures(certain.asDiagonal() * normal.S * certain.asDiagonal(),
-                                    certain.cwiseAbs2().cwiseProduct(normal.g), parts_, sure,
-                                    resolution_ > 0 ? kLeastGainIfRounded : kLeastGain);
+    // One for both axes: a score that is weakened on one axis only is no longer that of S.
+    const double certain = std::pow(
+        std::max(white_noise_ratio(data, state, at, 0), white_noise_ratio(data, state, at, 1)), -2);
+    fit_.priors =
+        choose_departures(certain * normal.S, certain * normal.g, parts_, with_slopes(sure),
+                          resolution_ > 0 ? kLeastGainIfRounded : kLeastGain);
+    refine_departures(normal.S, normal.g, parts_, sure, &fit_.priors);
+    add_possible_curves(normal, sure);
   }
   add_possible_play(&sure);
+  refine_departures(normal.S, normal.g, parts_, sure, &fit_.priors);
   fit_ = fit_departures(normal.S, normal.g, parts_, std::move(fit_.priors), sure);
   const VectorXd moved = subtracted_.size() == 0 ? fit_.mean : VectorXd(fit_.mean - subtracted_);
   change_ = std::sqrt(std::max(0.0, moved.dot(normal.S * moved)));
@@ -304,6 +304,38 @@ MatrixXd TelemetryDepartures::claim() const {
     root.rightCols(own.cols()) = own;
   }
   return root;
+}
+
+MatrixXd TelemetryDepartures::with_slopes(const MatrixXd& sure) const {
+  constexpr double kSteepest = 0.02;
+  MatrixXd root = sure;
+  for (const int axis : {0, 1}) {
+    const DeparturePart& curve = parts_[curve_part(axis)];
+    if (curve.count == 0 || curve.closed) continue;
+    root.conservativeResize(Eigen::NoChange, root.cols() + 1);
+    root.rightCols<1>().setZero();
+    const double half = 0.5 * knots_[static_cast<std::size_t>(axis)].extent_rad();
+    root.col(root.cols() - 1).segment(curve.first, curve.count) =
+        VectorXd::LinSpaced(curve.count, -kSteepest * half, kSteepest * half);
+  }
+  return root;
+}
+
+void TelemetryDepartures::add_possible_curves(const Normal& normal, const MatrixXd& sure) {
+  double largest = 0;
+  for (std::size_t i = 0; i < parts_.size(); ++i) {
+    if (parts_[i].shape != DepartureShape::kNumber)
+      largest = std::max(largest, fit_.priors[i].amplitude);
+  }
+  if (!(largest > 0)) return;
+  for (const int axis : {0, 1}) {
+    const std::size_t part = curve_part(axis);
+    bool ripples = false;
+    for (int i = 1; i <= kRipples; ++i) ripples |= is_present(part + static_cast<std::size_t>(i));
+    if (ripples || parts_[part].count == 0 || fit_.priors[part].amplitude >= largest) continue;
+    fit_.priors[part] =
+        possible_curve(normal.S, normal.g, parts_, fit_.priors, sure, part, largest);
+  }
 }
 
 void TelemetryDepartures::add_possible_play(MatrixXd* sure) const {

@@ -81,6 +81,11 @@ class TelemetryDepartures {
   [[nodiscard]] bool eliminate(const AdjustmentData& data, const AdjustmentState& state,
                                const Linearisation& at, Adjustment* adjustment, Normal* out) const;
   [[nodiscard]] Eigen::MatrixXd claim() const;
+  // Of either axis g may have any slope: no choice must rest on the other axis having none.
+  [[nodiscard]] Eigen::MatrixXd with_slopes(const Eigen::MatrixXd& sure) const;
+  // A head that errs by so much on one axis may well err as much on the other one, too slowly to
+  // show more than a bend.
+  void add_possible_curves(const Normal& normal, const Eigen::MatrixXd& sure);
   // A head that errs by so much may well have play of that size, too, which slow movements do not
   // tell from the clock offset.
   void add_possible_play(Eigen::MatrixXd* sure) const;
