@@ -33,15 +33,27 @@ struct VerifiedReplay {
   double telemetry_s = 0;  // from the first sample to the last
 };
 
+constexpr double kLater_s = 1;  // samples of so long after a frame enclose it with any clock offset
+
+std::vector<PanTiltSample> all_samples(const std::string& recording) {
+  const auto source = open_recorded_pan_tilt({recording, false});
+  std::vector<PanTiltSample> out;
+  while (const std::optional<PanTiltSample> sample = next_of<PanTiltSample>(*source))
+    out.push_back(*sample);
+  return out;
+}
+
 VerifiedReplay replay_both_modes(const VerifyOptions& options, OrientationStepOptions of_step) {
   std::string error;
   std::vector<FrameStamp> stamps;
   if (!read_frames_csv(options.recording, &stamps, &error)) throw CommandError(kExitUsage, error);
   OrientationStep by_telemetry(of_step);
+  OrientationStep by_all_samples(of_step);
   of_step.oe = oe_options(of_step.calibration.camera);
   OrientationStep by_landmarks(of_step);
   if (begins_fresh(stamps)) {
     by_telemetry.expect_fresh_frames();
+    by_all_samples.expect_fresh_frames();
     by_landmarks.expect_fresh_frames();
   }
   const Camera<double>& camera = of_step.calibration.camera;
@@ -49,34 +61,40 @@ VerifiedReplay replay_both_modes(const VerifyOptions& options, OrientationStepOp
                              of_step.telemetry_noise.pan_tilt_sigma);
   RecordedImages images(options.recording);
   const auto video = open_recorded_frames({options.recording, false, false});
-  const auto pan_tilt = open_recorded_pan_tilt({options.recording, false});
   StopSignals signals;
   VerifiedReplay out;
-  double first_sample_s = 0;
-  std::optional<PanTiltSample> sample = next_of<PanTiltSample>(*pan_tilt);
+  const std::vector<PanTiltSample> samples = all_samples(options.recording);
+  std::size_t now = 0;    // the first sample that has not come yet
+  std::size_t later = 0;  // likewise, so much later
   while (const std::optional<Frame> frame = next_of<Frame>(*video)) {
     if (signals.wait(-1, 0) == StopSignals::Event::kSignal) {
       throw CommandError(kExitUsage, options.recording + ": interrupted; nothing was judged");
     }
-    for (; sample && sample->latest_time_s <= frame->stamp.receive_time_s;
-         sample = next_of<PanTiltSample>(*pan_tilt)) {
-      by_telemetry.add_telemetry(*sample);
-      by_landmarks.add_telemetry(*sample);
-      if (out.samples++ == 0) first_sample_s = sample->latest_time_s;
-      out.telemetry_s = sample->latest_time_s - first_sample_s;
+    const double received_s = frame->stamp.receive_time_s;
+    for (; now < samples.size() && samples[now].latest_time_s <= received_s; ++now) {
+      by_telemetry.add_telemetry(samples[now]);
+      by_landmarks.add_telemetry(samples[now]);
     }
+    for (; later < samples.size() && samples[later].latest_time_s <= received_s + kLater_s; ++later)
+      by_all_samples.add_telemetry(samples[later]);
     const std::optional<Frame> image = images.of(frame->stamp);
     StepEvents events;
     const OrientationRecord of_telemetry =
         by_telemetry.add_frame(frame->stamp, ImageView{}, &events);
     const OrientationRecord of_landmarks =
         by_landmarks.add_frame(frame->stamp, view_of(image), &events);
-    collection.add(of_landmarks, of_telemetry, view_of(image));
+    const OrientationRecord of_all_samples =
+        by_all_samples.add_frame(frame->stamp, ImageView{}, &events);
+    collection.add(of_landmarks, of_telemetry, of_all_samples, view_of(image));
     by_telemetry.maintain();
+    by_all_samples.maintain();
     by_landmarks.maintain();
   }
   for (const std::string& remark : images.remarks()) spdlog::warn("{}", remark);
   out.frames = collection.frames();
+  out.samples = static_cast<int>(samples.size());
+  if (!samples.empty())
+    out.telemetry_s = samples.back().latest_time_s - samples.front().latest_time_s;
   return out;
 }
 

@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 
 #include "core/calibration/chance.h"
@@ -82,8 +83,8 @@ std::vector<DepartureColumns> all_departures(const std::vector<SeenFrame>& frame
     for (const Parameter parameter : parameters) out.parameters.push_back(index(parameter));
     return out;
   };
-  const auto pan = [](const SeenFrame& frame) { return frame.by_telemetry.angle.pan; };
-  const auto tilt = [](const SeenFrame& frame) { return frame.by_telemetry.angle.tilt; };
+  const auto pan = [](const SeenFrame& frame) { return frame.by_all_samples.angle.pan; };
+  const auto tilt = [](const SeenFrame& frame) { return frame.by_all_samples.angle.tilt; };
   const auto time = [](const SeenFrame& frame) { return frame.time_s; };
   return {of(Departure::kFocalLength, {Parameter::kFocalLength}),
           of(Departure::kDistortion, {Parameter::kRadialDistortion}),
@@ -126,7 +127,7 @@ class PairEquations {
       : frames_(frames), pairs_(pairs), departures_(all_departures(frames)) {
     for (const SeenFrame& frame : frames) {
       const Matrix4<double> covariance =
-          motion_inflation * frame.by_telemetry.motion_covariance.topLeftCorner<4, 4>();
+          motion_inflation * frame.by_all_samples.motion_covariance.topLeftCorner<4, 4>();
       frame_roots_.emplace_back(root_of(covariance));
     }
     ParameterCovariance<double> parameters = calibration.covariance;
@@ -170,10 +171,13 @@ class PairEquations {
     return out;
   }
 
-  // From now on this departure has any size.
-  void set_free(std::size_t d) {
-    for (int i = 0; i < departures_[d].count(); ++i)
-      free_.push_back(unknowns() + first_column_[d] + i);
+  // From now on these departures have any size, and no others.
+  void set_free(const std::vector<std::size_t>& departures) {
+    free_.clear();
+    for (const std::size_t d : departures) {
+      for (int i = 0; i < departures_[d].count(); ++i)
+        free_.push_back(unknowns() + first_column_[d] + i);
+    }
     solve();
   }
 
@@ -414,6 +418,13 @@ class PairEquations {
   Eigen::VectorXd solution_;
 };
 
+std::vector<std::size_t> without(const std::vector<std::size_t>& all, std::size_t one) {
+  std::vector<std::size_t> out;
+  std::copy_if(all.begin(), all.end(), std::back_inserter(out),
+               [one](std::size_t each) { return each != one; });
+  return out;
+}
+
 }  // namespace
 
 ModelCheckResult check_model(const std::vector<SeenFrame>& frames,
@@ -427,14 +438,18 @@ ModelCheckResult check_model(const std::vector<SeenFrame>& frames,
   out.pairs = static_cast<int>(pairs.size());
   for (const PairRows& pair : pairs) out.places += static_cast<int>(pair.places.size());
   out.noise_ratio = equations.noise_ratio();
-  std::vector<bool> is_free(equations.departures().size());
+  const auto test_of = [&equations](std::size_t d) {
+    DepartureTest test = equations.test(d);
+    test.claimed_sigma = equations.claimed_sigma(d);
+    return test;
+  };
+  std::vector<std::size_t> found;
   for (int round = 0; round <= kMostFound; ++round) {
     std::optional<DepartureTest> worst;
     std::size_t worst_at = 0;
     for (std::size_t d = 0; d < equations.departures().size(); ++d) {
-      if (is_free[d]) continue;
-      DepartureTest test = equations.test(d);
-      test.claimed_sigma = equations.claimed_sigma(d);
+      if (std::find(found.begin(), found.end(), d) != found.end()) continue;
+      DepartureTest test = test_of(d);
       if (!worst || test.log_chance < worst->log_chance) {
         worst = test;
         worst_at = d;
@@ -442,10 +457,27 @@ ModelCheckResult check_model(const std::vector<SeenFrame>& frames,
       if (round == 0) out.tests.push_back(std::move(test));
     }
     if (round == kMostFound || !worst || !(worst->log_chance < log_limit)) break;
-    out.found.push_back(*worst);
-    is_free[worst_at] = true;
-    equations.set_free(worst_at);
+    found.push_back(worst_at);
+    equations.set_free(found);
   }
+  // What was found first may have stood for what came later: each is tested beside all others.
+  for (std::size_t k = 0; found.size() > 1 && k < found.size();) {
+    const std::vector<std::size_t> others = without(found, found[k]);
+    equations.set_free(others);
+    if (test_of(found[k]).log_chance < log_limit) {
+      ++k;
+    } else {
+      found = others;
+      k = 0;
+    }
+  }
+  for (const std::size_t d : found) {
+    equations.set_free(without(found, d));
+    out.found.push_back(test_of(d));
+  }
+  std::sort(out.found.begin(), out.found.end(), [](const DepartureTest& a, const DepartureTest& b) {
+    return a.log_chance < b.log_chance;
+  });
   return out;
 }
 

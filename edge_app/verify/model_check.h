@@ -1,6 +1,6 @@
 #pragma once
 // Whether pictures and telemetry agree with the calibration, and if not, with what else they would.
-// All pairs of pictures together, with telemetry's orientations (pair_rows.h):
+// All pairs of pictures together, with the orientations by all of telemetry's samples (pair_rows.h):
 //   r = X x + noise     x: errors of frames and parameters, each with the covariance that is claimed
 // A departure is columns Z of unknown size a. With C the covariance of r that is claimed
 //   s = Z^T C^-1 r,   V = Z^T C^-1 Z,   s^T V^-1 s ~ chi-square if there is none    (score test)
@@ -51,8 +51,8 @@ struct DepartureTest {
   double claimed_sigma = 0;   // of a parameter, by the calibration
 };
 
-// Tests of all departures; and of those that were then found, in order, with the others before
-// them left free.
+// Tests of all departures; and of those that were found, each with the others left free, the least
+// probable first.
 struct ModelCheckResult {
   std::vector<DepartureTest> tests;
   std::vector<DepartureTest> found;

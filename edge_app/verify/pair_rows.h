@@ -13,7 +13,7 @@
 
 namespace alidade {
 
-enum class OrientationFrom { kTelemetry, kLandmarks };
+enum class OrientationFrom { kTelemetry, kAllSamples, kLandmarks };
 
 struct PlaceRow {
   Vector2<double> at;           // px, in the second picture
@@ -32,7 +32,15 @@ struct PairRows {
 
 [[nodiscard]] inline const FrameOrientation& orientation(const SeenFrame& frame,
                                                          OrientationFrom from) {
-  return from == OrientationFrom::kTelemetry ? frame.by_telemetry : frame.by_landmarks;
+  switch (from) {
+    case OrientationFrom::kTelemetry:
+      return frame.by_telemetry;
+    case OrientationFrom::kAllSamples:
+      return frame.by_all_samples;
+    case OrientationFrom::kLandmarks:
+      break;
+  }
+  return frame.by_landmarks;
 }
 
 // Pairs of which a frame has no such orientation are left out.

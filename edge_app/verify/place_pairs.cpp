@@ -27,7 +27,7 @@ constexpr double kNoOutlier_px = 0.5;
 
 // What says where a frame looks while places are searched for.
 const FrameOrientation& best_of(const SeenFrame& frame) {
-  return frame.by_landmarks.mode == OrientationMode::kOe ? frame.by_landmarks : frame.by_telemetry;
+  return frame.by_landmarks.mode == OrientationMode::kOe ? frame.by_landmarks : frame.by_all_samples;
 }
 
 std::optional<Vector2<double>> transfer(const FrameOrientation& from, const FrameOrientation& to,

@@ -43,12 +43,14 @@ void FrameCollection::note_heading(const PanTilt<double>& angle) {
 }
 
 void FrameCollection::add(const OrientationRecord& by_landmarks,
-                          const OrientationRecord& by_telemetry, const ImageView& image) {
+                          const OrientationRecord& by_telemetry,
+                          const OrientationRecord& by_all_samples, const ImageView& image) {
   const std::size_t frame = next_++;
-  if (!by_telemetry.orientation || !by_telemetry.time_s) return;
+  if (!by_telemetry.orientation || !by_telemetry.time_s || !by_all_samples.orientation) return;
   SeenFrame seen;
   seen.by_telemetry = unpack(by_telemetry.orientation->geometry, by_telemetry.camera);
-  note_heading(seen.by_telemetry.angle);
+  seen.by_all_samples = unpack(by_all_samples.orientation->geometry, by_all_samples.camera);
+  note_heading(seen.by_all_samples.angle);
   if (chosen_ >= wanted_ || frame < chosen_ * of_recording_ / wanted_) return;
   // A frame that cannot be used is replaced by the next one.
   const Camera<double>& camera = seen.by_telemetry.calibration.camera;

@@ -1,5 +1,6 @@
 #pragma once
-// SeenFrame: a frame of the recording with its picture and what both modes say of its orientation.
+// SeenFrame: a frame of the recording with its picture and what both modes say of its orientation;
+// PT mode also with the samples after the frame, which know more than a live step does.
 // FrameCollection: those frames of a replay that are compared with each other, evenly over the
 // recording, as many as fit into 256 MB. Allocates. One thread.
 
@@ -19,7 +20,8 @@ namespace alidade {
 struct SeenFrame {
   double time_s = 0;        // s, image clock; capture of row 0
   double time_sigma_s = 0;  // s; may be shared with all other frames
-  FrameOrientation by_telemetry;
+  FrameOrientation by_telemetry;    // by the samples that had come when the frame came
+  FrameOrientation by_all_samples;  // by those after it, too
   FrameOrientation by_landmarks;    // mode kNone: landmarks did not hold
   PanTilt<double> heading{0, 0};    // -1 or 1: the way each axis turned last; 0: not known
   std::vector<std::uint8_t> luma;   // row by row, without gaps
@@ -35,9 +37,9 @@ class FrameCollection {
   // movement.
   FrameCollection(std::size_t frames, int width, int height, double angle_sigma_rad);
 
-  // The next frame's records, of OE and of PT mode. image: not valid() if there is none.
+  // The next frame's records. image: not valid() if there is none.
   void add(const OrientationRecord& by_landmarks, const OrientationRecord& by_telemetry,
-           const ImageView& image);
+           const OrientationRecord& by_all_samples, const ImageView& image);
 
   [[nodiscard]] const std::vector<SeenFrame>& frames() const { return frames_; }
 

@@ -153,11 +153,11 @@ std::vector<Matrix4<double>> motion_covariances(const std::vector<SeenFrame>& fr
 
 // Telemetry's samples have so much to say of slow errors; the frames' covariances, taken as
 // independent, must not claim more.
-double motion_inflation(const VerifyInput& input) {
+double motion_inflation(const VerifyInput& input, OrientationFrom from) {
   if (input.frames.size() < 2 || !(input.telemetry_sigma_rad > 0)) return 1;
   std::vector<double> variances;
   for (const SeenFrame& frame : input.frames)
-    variances.push_back(frame.by_telemetry.motion_covariance(0, 0));
+    variances.push_back(orientation(frame, from).motion_covariance(0, 0));
   const auto middle = variances.begin() + static_cast<std::ptrdiff_t>(variances.size() / 2);
   std::nth_element(variances.begin(), middle, variances.end());
   const double duration_s = input.frames.back().time_s - input.frames.front().time_s;
@@ -389,17 +389,18 @@ Verification verify(const VerifyInput& input) {
   const std::vector<PlacePair> pairs = match_places(frames);
   out.by_landmarks = pair_rows(frames, pairs, OrientationFrom::kLandmarks);
   out.by_telemetry = pair_rows(frames, pairs, OrientationFrom::kTelemetry);
+  out.by_all_samples = pair_rows(frames, pairs, OrientationFrom::kAllSamples);
   out.pairs = static_cast<int>(out.by_telemetry.size());
   constexpr int kKinds = static_cast<int>(ReturnKind::kCount);
   out.chance_limit = kFalseAlarms / (2 * kKinds + kDepartureCount);
   const double log_limit = std::log(out.chance_limit);
   if (!out.by_telemetry.empty()) {
     std::size_t reference = 0;
-    const std::vector<PairRows> one_zoom = at_one_zoom(frames, out.by_telemetry, &reference);
+    const std::vector<PairRows> one_zoom = at_one_zoom(frames, out.by_all_samples, &reference);
     const Calibration& calibration = frames[reference].by_telemetry.calibration;
     const ModelCheckResult model =
         check_model(frames, one_zoom, calibration, input.telemetry_error,
-                    motion_inflation(input), log_limit);
+                    motion_inflation(input, OrientationFrom::kAllSamples), log_limit);
     out.places = model.places;
     out.noise_ratio = model.noise_ratio;
     out.found = model.found;
@@ -416,7 +417,8 @@ Verification verify(const VerifyInput& input) {
         comparison.result =
             check_claims(pair_means(of_kind(comparison.kind, frames, all), noise_factor),
                          motion_covariances(frames, from), calibration.covariance,
-                         motion_inflation(input), calibration.camera.focal_length);
+                         from == OrientationFrom::kTelemetry ? motion_inflation(input, from) : 1,
+                         calibration.camera.focal_length);
         const ClaimResult& result = comparison.result;
         if (result.pairs >= kLeastPairs && result.freedom >= kLeastFreedom) {
           comparison.verdict =

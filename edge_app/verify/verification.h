@@ -61,7 +61,7 @@ struct Verification {
   std::vector<ModelComparison> model;
   std::vector<DepartureTest> found;  // the least probable first
   // For plots.
-  std::vector<PairRows> by_landmarks, by_telemetry;
+  std::vector<PairRows> by_landmarks, by_telemetry, by_all_samples;
 };
 
 // A comparison with fewer independent numbers is not judged.
