@@ -18,8 +18,10 @@ constexpr double kFocalLength = 3000;  // px
 double brightness(double azimuth, double elevation) {
   const double u = kFocalLength * azimuth;
   const double v = kFocalLength * elevation;
-  return 128 + 45 * std::sin(0.31 * u + 0.4 * std::sin(0.09 * v)) * std::cos(0.27 * v) +
-         35 * std::sin(0.13 * u - 0.17 * v) * std::sin(0.05 * u + 1);
+  // Bent squares with soft edges.
+  const double squares = std::sin(0.21 * u + 0.8 * std::sin(0.04 * v)) *
+                         std::sin(0.19 * v + 0.8 * std::sin(0.05 * u + 1));
+  return 128 + 80 * std::tanh(6 * squares) + 20 * std::sin(0.017 * u - 0.023 * v);
 }
 
 SeenFrame frame_at(double time_s, double pan, double tilt) {
