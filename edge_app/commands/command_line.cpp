@@ -25,6 +25,7 @@
 #include "edge_app/commands/record.h"
 #include "edge_app/commands/replay.h"
 #include "edge_app/commands/run.h"
+#include "edge_app/commands/verify.h"
 #include "edge_app/config/nearest_word.h"
 
 namespace alidade {
@@ -116,6 +117,26 @@ void add_replay(CLI::App& app, int* exit_code) {
       "defaults, whatever they were live. To use a configuration: alidade run, with video and "
       "pan_tilt of type recording.");
   command->callback([options, exit_code] { *exit_code = replay_recording(*options); });
+}
+
+void add_verify(CLI::App& app, int* exit_code) {
+  auto options = std::make_shared<VerifyOptions>();
+  CLI::App* command = app.add_subcommand(
+      "verify",
+      "How good a calibration is on a recording, by places that are seen again; writes "
+      "verification.html");
+  command->add_option("recording", options->recording, "Directory of the recording")->required();
+  command->add_option("--calibration", options->calibration,
+                      "Calibration (default: DIR/alidade/calibration.yaml)");
+  command->add_option("-o,--output", options->directory,
+                      "Directory for verification.html (default: DIR/alidade)");
+  add_zoom_tolerance(command, &options->zoom_tolerance);
+  command->add_flag("--json", options->json, "The result on stdout as one line of JSON");
+  command->footer(
+      "Exit status: 0 the sigmas hold, 1 they are contradicted, 2 nothing could be judged. Record "
+      "for a minute while the head pans and tilts over a few fields of view, to and fro, at several "
+      "speeds.");
+  command->callback([options, exit_code] { *exit_code = verify_calibration(*options); });
 }
 
 void add_calibrate(CLI::App& app, int* exit_code) {
@@ -369,6 +390,7 @@ int run_command_line(int argc, char** argv) {
   add_run(app, &exit_code);
   add_record(app, &exit_code);
   add_replay(app, &exit_code);
+  add_verify(app, &exit_code);
   add_calibrate(app, &exit_code);
   add_calibrate_shutter(app, &exit_code);
   add_plane(app, &exit_code);

@@ -13,7 +13,6 @@
 #include <cstddef>
 #include <cstdio>
 #include <filesystem>
-#include <limits>
 #include <optional>
 #include <string>
 #include <system_error>
@@ -23,6 +22,7 @@
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/partial_file.h"
 #include "edge_app/commands/replay.h"
+#include "edge_app/commands/replay_input.h"
 #include "edge_app/commands/replay_targets.h"
 #include "edge_app/commands/run_report.h"
 #include "edge_app/commands/stop_signals.h"
@@ -59,80 +59,8 @@ class OrientationFile {
   RecordWriter writer_;
 };
 
-PublishedCalibration find_calibration(const ReplayOptions& options) {
-  if (!options.calibration.empty()) return require_calibration_file(options.calibration);
-  const fs::path beside = fs::path(options.recording) / "alidade" / "calibration.yaml";
-  if (!fs::exists(beside)) {
-    throw CommandError(
-        kExitUsage,
-        fmt::format("{0}: has no calibration ({1}); make one with `alidade calibrate {0}`, or give "
-                    "the calibration.file of `alidade run` with --calibration FILE",
-                    options.recording, beside.string()));
-  }
-  return require_calibration_file(beside.string());
-}
-
-void check_size(const RecordingInfo& info, const PublishedCalibration& calibration,
-                const std::string& recording) {
-  const Camera<double>& camera = calibration.calibration.camera;
-  if (info.width == camera.width && info.height == camera.height) return;
-  throw CommandError(
-      kExitFailed,
-      fmt::format(
-          "{}: frames have {}x{} px, but {} is for {}x{} px; give a calibration for this "
-          "size with --calibration, or set video.width and video.height to the calibration's "
-          "size and record again",
-          recording, info.width, info.height, calibration.name, camera.width, camera.height));
-}
-
-// The next item of a recording; empty at its end.
-template <typename Item, typename Source>
-std::optional<Item> next(Source& source) {
-  Item item;
-  const ReadStatus status = source.read(item, std::numeric_limits<double>::infinity());
-  if (status == ReadStatus::kOk) return item;
-  if (status == ReadStatus::kEnd) return std::nullopt;
-  throw CommandError(kExitFailed, source.error());
-}
-
-bool has_images(const std::string& recording) {
-  std::error_code ignored;
-  return fs::exists(fs::path(recording) / "video.mkv", ignored) ||
-         fs::is_directory(fs::path(recording) / "frames", ignored);
-}
-
-// The images of a recording. Another source counts its frames; some frames may have no image.
-class Images {
- public:
-  explicit Images(const std::string& recording)
-      : source_(open_recorded_frames({recording, true, false})) {
-    next_ = next<Frame>(*source_);
-    if (!next_) {
-      throw CommandError(kExitFailed, recording + ": none of its pictures can be decoded");
-    }
-  }
-
-  // The image of the frame with this stamp; empty if it is missing. Call it once for each frame, in
-  // order.
-  std::optional<Frame> of(const FrameStamp& stamp) {
-    std::optional<Frame> frame;
-    if (next_ && next_->stamp.frame == stamp.frame &&
-        next_->stamp.receive_time_s == stamp.receive_time_s) {
-      frame = std::move(next_);
-      next_ = next<Frame>(*source_);
-    }
-    return frame;
-  }
-
-  [[nodiscard]] std::vector<std::string> remarks() const { return source_->remarks(); }
-
- private:
-  std::unique_ptr<RecordingFrameSource> source_;
-  std::optional<Frame> next_;
-};
-
 // The images for OE mode; null: PT mode.
-std::unique_ptr<Images> open_images(const ReplayOptions& options) {
+std::unique_ptr<RecordedImages> open_images(const ReplayOptions& options) {
   const std::string& recording = options.recording;
   const bool demanded = options.mode == "OE";
   if (options.mode == "PT") return nullptr;
@@ -146,17 +74,12 @@ std::unique_ptr<Images> open_images(const ReplayOptions& options) {
                                        "needs; use --mode PT");
   }
   try {
-    return std::make_unique<Images>(recording);
+    return std::make_unique<RecordedImages>(recording);
   } catch (const CommandError& error) {
     if (demanded) throw;
     spdlog::warn("{}; replayed in PT mode", error.what());
     return nullptr;
   }
-}
-
-ImageView view_of(const std::optional<Frame>& image) {
-  if (!image) return {};
-  return {image->luma, image->width, image->height, image->stride};
 }
 
 // Counts for the last two lines of the log.
@@ -201,11 +124,12 @@ int replay_recording(const ReplayOptions& options) {
   RecordingInfo info;
   if (!read_recording_info(options.recording, &info, &error))
     throw CommandError(kExitFailed, error);
-  const PublishedCalibration calibration = find_calibration(options);
-  check_size(info, calibration, options.recording);
+  const PublishedCalibration calibration = find_calibration(options.recording, options.calibration);
+  error = size_error(info, calibration, options.recording);
+  if (!error.empty()) throw CommandError(kExitFailed, error);
   RecordingNoise noise;
   if (!load_noise(options.recording, &noise, &error)) throw CommandError(kExitFailed, error);
-  const std::unique_ptr<Images> images = open_images(options);
+  const std::unique_ptr<RecordedImages> images = open_images(options);
   OrientationStepOptions of_step = step_options(noise, calibration);
   of_step.zoom_tolerance = options.zoom_tolerance;
   if (images) of_step.oe = oe_options(calibration.calibration.camera);
@@ -240,8 +164,8 @@ int replay_recording(const ReplayOptions& options) {
   const double start_s = monotonic_now_s();
   std::optional<double> first_s;
   Summary summary(images != nullptr);
-  std::optional<PanTiltSample> sample = next<PanTiltSample>(*pan_tilt);
-  while (const std::optional<Frame> frame = next<Frame>(*video)) {
+  std::optional<PanTiltSample> sample = next_of<PanTiltSample>(*pan_tilt);
+  while (const std::optional<Frame> frame = next_of<Frame>(*video)) {
     const FrameStamp& stamp = frame->stamp;
     if (!first_s) first_s = stamp.receive_time_s;
     // A frame is due when it was received. If time stamps jump back, it is due at once.
@@ -251,7 +175,7 @@ int replay_recording(const ReplayOptions& options) {
       throw CommandError(kExitFailed, options.recording + ": replay interrupted; nothing stored");
     }
     for (; sample && sample->latest_time_s <= stamp.receive_time_s;
-         sample = next<PanTiltSample>(*pan_tilt)) {
+         sample = next_of<PanTiltSample>(*pan_tilt)) {
       step.add_telemetry(*sample);
     }
     const std::optional<Frame> image = images ? images->of(stamp) : std::nullopt;

@@ -7,13 +7,11 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
-#include <memory>
 #include <string>
 #include <vector>
 
 #include "test/edge_app/commands/alidade_command.h"
-#include "test/simulator/config.h"
-#include "test/simulator/recording_writer.h"
+#include "test/edge_app/commands/filmed_recording.h"
 #include "test/support/temporary_directory.h"
 
 namespace alidade {
@@ -26,21 +24,8 @@ using ::testing::Not;
 namespace fs = std::filesystem;
 using Rows = std::vector<std::map<std::string, std::string>>;
 
-constexpr int kFrames = 100;
-constexpr double kLongFocalLength = 8002;  // px
-
-// The paper's camera at a quarter of its size; telemetry errs by 1.6 px.
-constexpr const char* kCamera =
-    "seed: 5\n"
-    "duration_s: 8\n"
-    "image: {width: 480, height: 270, rate_hz: 12.5}\n"
-    "camera: {focal_length_px: 8002, radial_distortion: 55.4, line_delay_us: -56.8, "
-    "pan_axis_mrad: [-12, 0], tilt_axis_mrad: [0, 14], clock_offset_ms: -84.4}\n"
-    "path: {type: triple_cosine, amplitude: 0.5, period_s: 8}\n"
-    "scene: {procedural: [{azimuth_deg: 0, elevation_deg: 0, width_deg: 16, height_deg: 8}]}\n"
-    "sensor: {exposure_ms: 1, shot_noise: 0.02, read_noise: 0.7, jpeg_quality: 90}\n"
-    "telemetry: {rate_hz: 50, sigma_rad: 2.0e-4}\n"
-    "recording: {images: video}\n";
+constexpr int kFrames = kFilmedFrames;
+constexpr double kLongFocalLength = kFilmedFocalLength;
 
 int count_mode(const Rows& rows, const std::string& mode) {
   int count = 0;
@@ -50,14 +35,7 @@ int count_mode(const Rows& rows, const std::string& mode) {
 
 class ReplayVideoTest : public ::testing::Test {
  protected:
-  static void SetUpTestSuite() {
-    rendered_ = std::make_unique<TemporaryDirectory>();
-    const std::string camera = rendered_->write("camera.yaml", kCamera);
-    simulator::write_recording(simulator::load_config(camera), rendered_->path() + "/recording");
-  }
-  static void TearDownTestSuite() { rendered_.reset(); }
-
-  static std::string recording() { return rendered_->path() + "/recording"; }
+  static std::string recording() { return filmed_recording().path() + "/recording"; }
   // One's own, to spoil.
   std::string copy_of_recording() {
     fs::copy(recording(), directory_.path() + "/copy", fs::copy_options::recursive);
@@ -79,7 +57,7 @@ class ReplayVideoTest : public ::testing::Test {
 
   // Root mean square of the angles' distance from truth, without what all have in common, from 1 s on. px
   static double spread(const Rows& rows, const std::string& angle) {
-    const Rows truth = read_csv(rendered_->read("recording/truth.csv"));
+    const Rows truth = read_csv(filmed_recording().read("recording/truth.csv"));
     std::vector<double> errors;
     for (std::size_t i = 13; i < rows.size(); ++i) {
       EXPECT_EQ(rows[i].at("frame"), truth.at(i).at("frame"));
@@ -94,12 +72,7 @@ class ReplayVideoTest : public ::testing::Test {
   }
 
   TemporaryDirectory directory_;
-
- private:
-  static std::unique_ptr<TemporaryDirectory> rendered_;
 };
-
-std::unique_ptr<TemporaryDirectory> ReplayVideoTest::rendered_;
 
 TEST_F(ReplayVideoTest, HoldsToLandmarksAndComesMuchNearerToTruthThanTelemetry) {
   Result result = replay(recording(), {"--mode", "PT"});

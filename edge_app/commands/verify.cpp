@@ -1,0 +1,159 @@
+// `alidade verify`: replays a recording in OE and in PT mode, as `alidade replay` does, and compares
+// directions of places that are seen again. The room edge_app/verify compares; this file reads the
+// recording, prints and writes the report.
+
+#include "edge_app/commands/verify.h"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <cstdio>
+#include <ctime>
+#include <string>
+#include <vector>
+
+#include "edge_app/clocks/fresh_beginning.h"
+#include "edge_app/commands/command.h"
+#include "edge_app/commands/output_directory.h"
+#include "edge_app/commands/replay_input.h"
+#include "edge_app/commands/stop_signals.h"
+#include "edge_app/config/noise_file.h"
+#include "edge_app/verify/verification.h"
+#include "edge_app/verify/verification_json.h"
+#include "edge_app/verify/verification_report.h"
+#include "platform/pan_tilt/recording_pan_tilt_source.h"
+
+namespace alidade {
+namespace {
+
+struct VerifiedReplay {
+  std::vector<SeenFrame> frames;
+  int samples = 0;
+  double telemetry_s = 0;  // from the first sample to the last
+};
+
+constexpr double kLater_s = 1;  // samples of so long after a frame enclose it with any clock offset
+
+std::vector<PanTiltSample> all_samples(const std::string& recording) {
+  const auto source = open_recorded_pan_tilt({recording, false});
+  std::vector<PanTiltSample> out;
+  while (const std::optional<PanTiltSample> sample = next_of<PanTiltSample>(*source))
+    out.push_back(*sample);
+  return out;
+}
+
+VerifiedReplay replay_both_modes(const VerifyOptions& options, OrientationStepOptions of_step) {
+  std::string error;
+  std::vector<FrameStamp> stamps;
+  if (!read_frames_csv(options.recording, &stamps, &error)) throw CommandError(kExitUsage, error);
+  OrientationStep by_telemetry(of_step);
+  OrientationStep by_all_samples(of_step);
+  of_step.oe = oe_options(of_step.calibration.camera);
+  OrientationStep by_landmarks(of_step);
+  if (begins_fresh(stamps)) {
+    by_telemetry.expect_fresh_frames();
+    by_all_samples.expect_fresh_frames();
+    by_landmarks.expect_fresh_frames();
+  }
+  const Camera<double>& camera = of_step.calibration.camera;
+  FrameCollection collection(stamps.size(), camera.width, camera.height,
+                             of_step.telemetry_noise.pan_tilt_sigma);
+  RecordedImages images(options.recording);
+  const auto video = open_recorded_frames({options.recording, false, false});
+  StopSignals signals;
+  VerifiedReplay out;
+  const std::vector<PanTiltSample> samples = all_samples(options.recording);
+  std::size_t now = 0;    // the first sample that has not come yet
+  std::size_t later = 0;  // likewise, so much later
+  while (const std::optional<Frame> frame = next_of<Frame>(*video)) {
+    if (signals.wait(-1, 0) == StopSignals::Event::kSignal) {
+      throw CommandError(kExitUsage, options.recording + ": interrupted; nothing was judged");
+    }
+    const double received_s = frame->stamp.receive_time_s;
+    for (; now < samples.size() && samples[now].latest_time_s <= received_s; ++now) {
+      by_telemetry.add_telemetry(samples[now]);
+      by_landmarks.add_telemetry(samples[now]);
+    }
+    for (; later < samples.size() && samples[later].latest_time_s <= received_s + kLater_s; ++later)
+      by_all_samples.add_telemetry(samples[later]);
+    const std::optional<Frame> image = images.of(frame->stamp);
+    StepEvents events;
+    const OrientationRecord of_telemetry =
+        by_telemetry.add_frame(frame->stamp, ImageView{}, &events);
+    const OrientationRecord of_landmarks =
+        by_landmarks.add_frame(frame->stamp, view_of(image), &events);
+    const OrientationRecord of_all_samples =
+        by_all_samples.add_frame(frame->stamp, ImageView{}, &events);
+    collection.add(of_landmarks, of_telemetry, of_all_samples, view_of(image));
+    by_telemetry.maintain();
+    by_all_samples.maintain();
+    by_landmarks.maintain();
+  }
+  for (const std::string& remark : images.remarks()) spdlog::warn("{}", remark);
+  out.frames = collection.frames();
+  out.samples = static_cast<int>(samples.size());
+  if (!samples.empty())
+    out.telemetry_s = samples.back().latest_time_s - samples.front().latest_time_s;
+  return out;
+}
+
+Verification judge_recording(const VerifyOptions& options) {
+  std::string error;
+  RecordingInfo info;
+  if (!read_recording_info(options.recording, &info, &error)) throw CommandError(kExitUsage, error);
+  const PublishedCalibration calibration = find_calibration(options.recording, options.calibration);
+  error = size_error(info, calibration, options.recording);
+  if (!error.empty()) throw CommandError(kExitUsage, error);
+  RecordingNoise noise;
+  if (!load_noise(options.recording, &noise, &error)) throw CommandError(kExitUsage, error);
+  if (!has_images(options.recording)) {
+    throw CommandError(kExitUsage, options.recording +
+                                       ": has no pictures (video.mkv or frames/), in which places "
+                                       "could be seen again; record with video");
+  }
+  OrientationStepOptions of_step = step_options(noise, calibration);
+  of_step.zoom_tolerance = options.zoom_tolerance;
+  of_step.wait_for_pace = !noise.image_stamp_sigma_s;
+  const VerifiedReplay replay = replay_both_modes(options, of_step);
+  return verify({options.recording, calibration.name, replay.frames, calibration.telemetry_error,
+                 of_step.telemetry_noise.pan_tilt_sigma,
+                 replay.telemetry_s > 0 ? (replay.samples - 1) / replay.telemetry_s : 0});
+}
+
+int exit_code_of(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::kHolds:
+      return kExitOk;
+    case Verdict::kContradicted:
+      return kExitFailed;
+    case Verdict::kNotJudged:
+      break;
+  }
+  return kExitUsage;
+}
+
+}  // namespace
+
+int verify_calibration(const VerifyOptions& options) {
+  try {
+    const Verification verification = judge_recording(options);
+    OutputDirectory directory(options.directory, options.recording);
+    directory.add("report", "verification.html",
+                  verification_report(
+                      verification,
+                      {options.recording, ALIDADE_VERSION,
+                       fmt::format("{:%Y-%m-%d %H:%M} UTC", fmt::gmtime(std::time(nullptr)))}));
+    std::fputs(options.json ? verification_json(verification, directory.files()).c_str()
+                            : verification_text(verification).c_str(),
+               stdout);
+    if (std::fflush(stdout) != 0) throw CommandError(kExitUsage, "stdout: cannot be written");
+    for (const auto& [kind, path] : directory.files()) spdlog::info("{}: {}", kind, path);
+    return exit_code_of(verification.verdict);
+  } catch (const CommandError& failure) {
+    // 1 would say that the calibration is contradicted.
+    throw CommandError(kExitUsage, failure.what());
+  }
+}
+
+}  // namespace alidade

@@ -1,0 +1,23 @@
+#pragma once
+// `alidade verify`. The command line (command_line.cpp) names the options as here and checks them.
+
+#include <optional>
+#include <string>
+
+namespace alidade {
+
+struct VerifyOptions {
+  std::string recording;
+  std::string calibration;  // empty: <recording>/alidade/calibration.yaml
+  std::string directory;    // for verification.html; empty: <recording>/alidade
+  // Device units; readings that differ by no more are one zoom. Empty: found from their jitter.
+  std::optional<double> zoom_tolerance;
+  bool json = false;
+};
+
+// How good a calibration is on a recording. Returns the exit code: kExitOk if the sigmas hold,
+// kExitFailed if they are contradicted, kExitUsage if that cannot be judged. Throws CommandError,
+// with kExitUsage: nothing was judged.
+[[nodiscard]] int verify_calibration(const VerifyOptions& options);
+
+}  // namespace alidade

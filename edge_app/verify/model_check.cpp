@@ -1,0 +1,484 @@
+#include "edge_app/verify/model_check.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <limits>
+
+#include "core/calibration/chance.h"
+
+namespace alidade {
+namespace {
+
+constexpr int kAngleKnots = 13;
+constexpr int kTimeKnots = 6;
+constexpr int kMostFound = 4;
+constexpr double kHuber = 3;        // sigmas of noise; a residual beyond counts less
+constexpr double kNotSeen = 1e-6;   // share of a column that nothing else explains
+constexpr int kFrameErrors = 4;     // pan, tilt, their rates
+constexpr double kNoRange_rad = 1e-3;
+
+// A column that shifts a frame's angles or parameter by a known number.
+struct FrameColumn {
+  enum class What { kPan, kTilt, kFocalLength } what = What::kPan;
+  std::vector<double> of_frame;  // for an amplitude of 1
+};
+
+struct DepartureColumns {
+  Departure departure;
+  std::vector<int> parameters;         // of Parameter; or
+  std::vector<FrameColumn> columns;
+  std::vector<double> at;
+  [[nodiscard]] int count() const {
+    return static_cast<int>(parameters.size() + columns.size());
+  }
+};
+
+// Piecewise linear, 1 at knot k and 0 at its neighbours.
+double hat(double x, const std::vector<double>& knots, std::size_t k) {
+  const double spacing = knots[1] - knots[0];
+  return std::max(0.0, 1 - std::abs(x - knots[k]) / spacing);
+}
+
+std::vector<double> knots_over(double low, double high, int count) {
+  std::vector<double> out;
+  for (int i = 0; i < count; ++i) out.push_back(low + (high - low) * i / (count - 1));
+  return out;
+}
+
+template <class ValueOf>
+DepartureColumns curve(Departure departure, FrameColumn::What what, double sign, int knots,
+                       const std::vector<SeenFrame>& frames, const ValueOf& value_of) {
+  DepartureColumns out{departure, {}, {}, {}};
+  double low = std::numeric_limits<double>::infinity();
+  double high = -low;
+  for (const SeenFrame& frame : frames) {
+    low = std::min(low, value_of(frame));
+    high = std::max(high, value_of(frame));
+  }
+  if (!(high - low > kNoRange_rad)) return out;
+  out.at = knots_over(low, high, knots);
+  for (std::size_t k = 0; k < out.at.size(); ++k) {
+    FrameColumn column{what, {}};
+    for (const SeenFrame& frame : frames)
+      column.of_frame.push_back(sign * hat(value_of(frame), out.at, k));
+    out.columns.push_back(std::move(column));
+  }
+  return out;
+}
+
+template <class HeadingOf>
+DepartureColumns play(Departure departure, FrameColumn::What what,
+                      const std::vector<SeenFrame>& frames, const HeadingOf& heading_of) {
+  FrameColumn column{what, {}};
+  for (const SeenFrame& frame : frames) column.of_frame.push_back(-0.5 * heading_of(frame));
+  return {departure, {}, {column}, {}};
+}
+
+std::vector<DepartureColumns> all_departures(const std::vector<SeenFrame>& frames) {
+  using What = FrameColumn::What;
+  const auto of = [](Departure departure, std::initializer_list<Parameter> parameters) {
+    DepartureColumns out{departure, {}, {}, {}};
+    for (const Parameter parameter : parameters) out.parameters.push_back(index(parameter));
+    return out;
+  };
+  const auto pan = [](const SeenFrame& frame) { return frame.by_all_samples.angle.pan; };
+  const auto tilt = [](const SeenFrame& frame) { return frame.by_all_samples.angle.tilt; };
+  const auto time = [](const SeenFrame& frame) { return frame.time_s; };
+  return {of(Departure::kFocalLength, {Parameter::kFocalLength}),
+          of(Departure::kDistortion, {Parameter::kRadialDistortion}),
+          of(Departure::kCentre, {Parameter::kCentreU, Parameter::kCentreV}),
+          of(Departure::kAspect, {Parameter::kAspect}),
+          of(Departure::kLineDelay, {Parameter::kLineDelay}),
+          of(Departure::kPanAxis, {Parameter::kPanAxis0, Parameter::kPanAxis1}),
+          of(Departure::kTiltAxis, {Parameter::kTiltAxis0, Parameter::kTiltAxis1}),
+          of(Departure::kClockOffset, {Parameter::kClockOffset}),
+          curve(Departure::kPanGear, What::kPan, -1, kAngleKnots, frames, pan),
+          curve(Departure::kTiltGear, What::kTilt, -1, kAngleKnots, frames, tilt),
+          play(Departure::kPanPlay, What::kPan, frames,
+               [](const SeenFrame& frame) { return frame.heading.pan; }),
+          play(Departure::kTiltPlay, What::kTilt, frames,
+               [](const SeenFrame& frame) { return frame.heading.tilt; }),
+          curve(Departure::kFocalDrift, What::kFocalLength, 1, kTimeKnots, frames, time),
+          curve(Departure::kPanDrift, What::kPan, -1, kTimeKnots, frames, time),
+          curve(Departure::kTiltDrift, What::kTilt, -1, kTimeKnots, frames, time)};
+}
+
+// L with covariance = L L^T; a zero row stays zero.
+Eigen::MatrixXd root_of(const Eigen::MatrixXd& covariance) {
+  // By its correlations, as units differ by many powers of ten.
+  Eigen::VectorXd sigma = covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
+  Eigen::VectorXd inverse = sigma;
+  for (double& each : inverse) each = each > 0 ? 1 / each : 0;
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(inverse.asDiagonal() * covariance *
+                                                              inverse.asDiagonal());
+  return sigma.asDiagonal() * solver.eigenvectors() *
+         solver.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+}
+
+// The equations of all pairs. Unknowns, whitened by their claimed covariance: each frame's errors,
+// the parameters, what is left of telemetry's known errors. Then the departures, and r.
+class PairEquations {
+ public:
+  PairEquations(const std::vector<SeenFrame>& frames, const std::vector<PairRows>& pairs,
+                const Calibration& calibration, const TelemetryError& telemetry_error,
+                double motion_inflation)
+      : frames_(frames), pairs_(pairs), departures_(all_departures(frames)) {
+    for (const SeenFrame& frame : frames) {
+      const Matrix4<double> covariance =
+          motion_inflation * frame.by_all_samples.motion_covariance.topLeftCorner<4, 4>();
+      frame_roots_.emplace_back(root_of(covariance));
+    }
+    ParameterCovariance<double> parameters = calibration.covariance;
+    parameters(index(Parameter::kClockOffset), index(Parameter::kClockOffset)) +=
+        shared_time_variance();
+    parameter_root_ = root_of(parameters);
+    for (const DepartureColumns& departure : departures_) {
+      first_column_.push_back(columns_);
+      columns_ += departure.count();
+      add_known(departure, telemetry_error);
+    }
+  }
+
+  [[nodiscard]] const std::vector<DepartureColumns>& departures() const { return departures_; }
+  [[nodiscard]] double noise_ratio() const { return noise_ratio_; }
+
+  // Sums the equations up, with the noise that residuals show.
+  void sum() {
+    add_up();
+    solve();
+    measure_noise();
+    add_up();
+    solve();
+  }
+
+  // `d` against the present unknowns.
+  [[nodiscard]] DepartureTest test(std::size_t d) const {
+    const DepartureColumns& departure = departures_[d];
+    DepartureTest out;
+    out.departure = departure.departure;
+    out.at = departure.at;
+    const int n = departure.count();
+    if (n == 0) return out;
+    const int at = unknowns() + first_column_[d];
+    Eigen::MatrixXd left(n, solution_.size());
+    left << sums_.block(at, 0, n, unknowns()), columns_of(free_, at, n);
+    const Eigen::VectorXd s = sums_.block(at, last(), n, 1) - left * solution_;
+    const Eigen::MatrixXd explained = information_.solve(left.transpose());
+    const Eigen::MatrixXd V = sums_.block(at, at, n, n) - left * explained;
+    judge(sums_.block(at, at, n, n).diagonal(), s, V, scatter_of(at, explained, V), &out);
+    return out;
+  }
+
+  // From now on these departures have any size, and no others.
+  void set_free(const std::vector<std::size_t>& departures) {
+    free_.clear();
+    for (const std::size_t d : departures) {
+      for (int i = 0; i < departures_[d].count(); ++i)
+        free_.push_back(unknowns() + first_column_[d] + i);
+    }
+    solve();
+  }
+
+  [[nodiscard]] double claimed_sigma(std::size_t d) const {
+    if (departures_[d].parameters.empty()) return 0;
+    return parameter_root_.row(departures_[d].parameters.front()).norm();
+  }
+
+ private:
+  [[nodiscard]] int unknowns() const {
+    return kFrameErrors * static_cast<int>(frames_.size()) + shared();
+  }
+  [[nodiscard]] int shared() const { return kParameterCount + static_cast<int>(known_.size()); }
+  [[nodiscard]] int last() const { return unknowns() + columns_; }
+
+  // Errors of the frames' times may be the same in all of them.
+  [[nodiscard]] double shared_time_variance() const {
+    std::vector<double> sigmas;
+    for (const SeenFrame& frame : frames_) sigmas.push_back(frame.time_sigma_s);
+    if (sigmas.empty()) return 0;
+    const auto middle = sigmas.begin() + static_cast<std::ptrdiff_t>(sigmas.size() / 2);
+    std::nth_element(sigmas.begin(), middle, sigmas.end());
+    return *middle * *middle;
+  }
+
+  void add_known(const DepartureColumns& departure, const TelemetryError& error) {
+    const auto add = [&](double sigma, const FrameColumn& column) {
+      if (!(sigma > 0)) return;
+      known_.push_back(column);
+      for (double& each : known_.back().of_frame) each *= sigma;
+    };
+    for (std::size_t k = 0; k < departure.columns.size(); ++k) {
+      const FrameColumn& column = departure.columns[k];
+      if (departure.departure == Departure::kPanGear) add(error.pan.sigma(departure.at[k]), column);
+      if (departure.departure == Departure::kTiltGear)
+        add(error.tilt.sigma(departure.at[k]), column);
+      if (departure.departure == Departure::kPanPlay) add(error.pan_play.sigma_rad, column);
+      if (departure.departure == Departure::kTiltPlay) add(error.tilt_play.sigma_rad, column);
+    }
+  }
+
+  [[nodiscard]] static Vector2<double> by(const FrameColumn& column, const PairRows& pair,
+                                          const PlaceRow& place) {
+    const double first = column.of_frame[pair.first];
+    const double second = column.of_frame[pair.second];
+    if (column.what == FrameColumn::What::kFocalLength) {
+      const int f = index(Parameter::kFocalLength);
+      return place.P_first.col(f) * first + place.P_second.col(f) * second;
+    }
+    const int axis = column.what == FrameColumn::What::kPan ? 0 : 1;
+    return place.J_first.col(axis) * first + place.J_second.col(axis) * second;
+  }
+
+  // Row pair of one place: errors of both frames, what is shared, departures, r.
+  [[nodiscard]] Eigen::Matrix<double, 2, Eigen::Dynamic> row(const PairRows& pair,
+                                                            const PlaceRow& place) const {
+    Eigen::Matrix<double, 2, Eigen::Dynamic> out(2, 2 * kFrameErrors + shared() + columns_ + 1);
+    out.leftCols<kFrameErrors>() = place.J_first * frame_roots_[pair.first];
+    out.middleCols<kFrameErrors>(kFrameErrors) = place.J_second * frame_roots_[pair.second];
+    const Sensitivity<2> P = place.P_first + place.P_second;
+    int at = 2 * kFrameErrors;
+    out.middleCols<kParameterCount>(at) = P * parameter_root_;
+    at += kParameterCount;
+    for (const FrameColumn& column : known_) out.col(at++) = by(column, pair, place);
+    for (const DepartureColumns& departure : departures_) {
+      for (const int parameter : departure.parameters) out.col(at++) = P.col(parameter);
+      for (const FrameColumn& column : departure.columns) out.col(at++) = by(column, pair, place);
+    }
+    out.col(at) = place.residual;
+    return out;
+  }
+
+  [[nodiscard]] std::vector<int> places_of(const PairRows& pair) const {
+    std::vector<int> out;
+    for (const std::size_t frame : {pair.first, pair.second}) {
+      for (int i = 0; i < kFrameErrors; ++i)
+        out.push_back(kFrameErrors * static_cast<int>(frame) + i);
+    }
+    for (int i = kFrameErrors * static_cast<int>(frames_.size()); i <= last(); ++i)
+      out.push_back(i);
+    return out;
+  }
+
+  void add_up() {
+    sums_ = Eigen::MatrixXd::Zero(last() + 1, last() + 1);
+    of_pair_.clear();
+    std::size_t n = 0;
+    for (const PairRows& pair : pairs_) {
+      const int size = 2 * kFrameErrors + shared() + columns_ + 1;
+      Eigen::MatrixXd own = Eigen::MatrixXd::Zero(size, size);
+      for (const PlaceRow& place : pair.places) {
+        const double weight = weights_.empty() ? 1 : weights_[n++];
+        const Eigen::Matrix<double, 2, Eigen::Dynamic> rows = row(pair, place);
+        own.noalias() += rows.transpose() * (weight * place.covariance.inverse()) * rows;
+      }
+      const std::vector<int> at = places_of(pair);
+      for (int i = 0; i < size; ++i) {
+        for (int j = 0; j < size; ++j)
+          sums_(at[static_cast<std::size_t>(i)], at[static_cast<std::size_t>(j)]) += own(i, j);
+      }
+      of_pair_.push_back(std::move(own));
+    }
+  }
+
+  [[nodiscard]] Eigen::MatrixXd columns_of(const std::vector<int>& columns, int row,
+                                           int rows) const {
+    Eigen::MatrixXd out(rows, static_cast<int>(columns.size()));
+    for (std::size_t k = 0; k < columns.size(); ++k)
+      out.col(static_cast<int>(k)) = sums_.block(row, columns[k], rows, 1);
+    return out;
+  }
+
+  void solve() {
+    const int n = unknowns();
+    const int more = static_cast<int>(free_.size());
+    Eigen::MatrixXd N = Eigen::MatrixXd::Zero(n + more, n + more);
+    N.topLeftCorner(n, n) = sums_.topLeftCorner(n, n);
+    N.topLeftCorner(n, n).diagonal().array() += 1;  // the claimed covariances
+    Eigen::VectorXd g(n + more);
+    g.head(n) = sums_.block(0, last(), n, 1);
+    for (int a = 0; a < more; ++a) {
+      const int column = free_[static_cast<std::size_t>(a)];
+      N.block(0, n + a, n, 1) = sums_.block(0, column, n, 1);
+      N.block(n + a, 0, 1, n) = N.block(0, n + a, n, 1).transpose();
+      for (int b = 0; b < more; ++b)
+        N(n + a, n + b) = sums_(column, free_[static_cast<std::size_t>(b)]);
+      // What the recording does not show of it stays where it is.
+      N(n + a, n + a) *= 1 + kNotSeen;
+      g[n + a] = sums_(column, last());
+    }
+    information_.compute(N);
+    solution_ = information_.solve(g);
+  }
+
+  void measure_noise() {
+    std::vector<double> squares;
+    for (const PairRows& pair : pairs_) {
+      Eigen::VectorXd x(2 * kFrameErrors + shared());
+      x << solution_.segment<kFrameErrors>(kFrameErrors * static_cast<int>(pair.first)),
+          solution_.segment<kFrameErrors>(kFrameErrors * static_cast<int>(pair.second)),
+          solution_.segment(kFrameErrors * static_cast<int>(frames_.size()), shared());
+      for (const PlaceRow& place : pair.places) {
+        const Eigen::Matrix<double, 2, Eigen::Dynamic> rows = row(pair, place);
+        const Vector2<double> left = place.residual - rows.leftCols(x.size()) * x;
+        squares.push_back(left.dot(place.covariance.inverse() * left));
+      }
+    }
+    if (squares.empty()) return;
+    std::vector<double> sorted = squares;
+    const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+    std::nth_element(sorted.begin(), middle, sorted.end());
+    const double variance = std::max(1.0, *middle / (2 * std::log(2.0)));
+    noise_ratio_ = std::sqrt(*middle / (2 * std::log(2.0)));
+    weights_.clear();
+    for (const double square : squares) {
+      const double sigmas = std::sqrt(square / variance);
+      weights_.push_back(std::min(1.0, kHuber / std::max(sigmas, 1e-12)) / variance);
+    }
+  }
+
+  // By how much the variance of s exceeds V, as the places of a pair have errors in common. Only
+  // the part by the pictures' noise is judged: Z~^T W (r - X x) pair by pair, Z~ = Z - X explained.
+  [[nodiscard]] double scatter_of(int at, const Eigen::MatrixXd& explained,
+                                  const Eigen::MatrixXd& V) const {
+    const auto n = static_cast<int>(V.rows());
+    const int x_count = 2 * kFrameErrors + shared();
+    Eigen::VectorXd squares = Eigen::VectorXd::Zero(n);
+    Eigen::VectorXd expected = Eigen::VectorXd::Zero(n);
+    for (std::size_t p = 0; p < pairs_.size(); ++p) {
+      const std::vector<int> places = places_of(pairs_[p]);
+      const Eigen::MatrixXd& own = of_pair_[p];
+      Eigen::MatrixXd change = Eigen::MatrixXd::Zero(own.rows(), n + 1);  // Z~, and r - X x
+      for (int i = 0; i < x_count; ++i) {
+        const int global = places[static_cast<std::size_t>(i)];
+        change.row(i) << -explained.row(global), -solution_[global];
+      }
+      for (std::size_t k = 0; k < free_.size(); ++k) {
+        const int global = unknowns() + static_cast<int>(k);
+        change.row(free_[k] - unknowns() + x_count) << -explained.row(global), -solution_[global];
+      }
+      for (int i = 0; i < n; ++i) change(at - unknowns() + x_count + i, i) += 1;
+      change(own.rows() - 1, n) = 1;
+      const Eigen::MatrixXd product = own * change;
+      for (int i = 0; i < n; ++i) {
+        const double part = change.col(i).dot(product.col(n));
+        squares[i] += part * part;
+        expected[i] += change.col(i).dot(product.col(i));
+      }
+    }
+    double out = 1;
+    for (int i = 0; i < n; ++i) {
+      if (V(i, i) > kNotSeen * sums_(at + i, at + i))
+        out = std::max(out, 1 + (squares[i] - expected[i]) / V(i, i));
+    }
+    return out;
+  }
+
+  static void judge(const Eigen::VectorXd& scale, const Eigen::VectorXd& s,
+                    const Eigen::MatrixXd& V, double scatter, DepartureTest* out) {
+    const auto n = static_cast<int>(s.size());
+    Eigen::VectorXd unit = scale.cwiseMax(0.0).cwiseSqrt();
+    for (double& each : unit) each = each > 0 ? 1 / each : 0;
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(unit.asDiagonal() * V *
+                                                                unit.asDiagonal());
+    Eigen::VectorXd inverse = Eigen::VectorXd::Zero(n);
+    for (int i = 0; i < n; ++i) {
+      if (solver.eigenvalues()[i] <= kNotSeen) continue;
+      inverse[i] = 1 / solver.eigenvalues()[i];
+      ++out->freedom;
+    }
+    const Eigen::MatrixXd covariance = unit.asDiagonal() * solver.eigenvectors() *
+                                       inverse.asDiagonal() * solver.eigenvectors().transpose() *
+                                       unit.asDiagonal();
+    const Eigen::VectorXd size = covariance * s;
+    out->scatter = scatter;
+    out->chi_square = s.dot(size) / scatter;
+    if (out->freedom > 0) out->log_chance = internal::log_chance(out->chi_square, out->freedom);
+    for (int i = 0; i < n; ++i) {
+      out->size.push_back(size[i]);
+      out->sigma.push_back(std::sqrt(std::max(0.0, scatter * covariance(i, i))));
+    }
+  }
+
+  const std::vector<SeenFrame>& frames_;
+  const std::vector<PairRows>& pairs_;
+  std::vector<DepartureColumns> departures_;
+  std::vector<int> first_column_;
+  int columns_ = 0;
+  std::vector<FrameColumn> known_;
+  std::vector<Matrix4<double>> frame_roots_;
+  Eigen::Matrix<double, kParameterCount, kParameterCount> parameter_root_;
+  std::vector<double> weights_;  // of each place, in order; empty: 1
+  double noise_ratio_ = 1;
+  std::vector<int> free_;
+  Eigen::MatrixXd sums_;
+  std::vector<Eigen::MatrixXd> of_pair_;
+  Eigen::LDLT<Eigen::MatrixXd> information_;
+  Eigen::VectorXd solution_;
+};
+
+std::vector<std::size_t> without(const std::vector<std::size_t>& all, std::size_t one) {
+  std::vector<std::size_t> out;
+  std::copy_if(all.begin(), all.end(), std::back_inserter(out),
+               [one](std::size_t each) { return each != one; });
+  return out;
+}
+
+}  // namespace
+
+ModelCheckResult check_model(const std::vector<SeenFrame>& frames,
+                             const std::vector<PairRows>& pairs, const Calibration& calibration,
+                             const TelemetryError& telemetry_error, double motion_inflation,
+                             double log_limit) {
+  ModelCheckResult out;
+  if (pairs.empty()) return out;
+  PairEquations equations(frames, pairs, calibration, telemetry_error, motion_inflation);
+  equations.sum();
+  out.pairs = static_cast<int>(pairs.size());
+  for (const PairRows& pair : pairs) out.places += static_cast<int>(pair.places.size());
+  out.noise_ratio = equations.noise_ratio();
+  const auto test_of = [&equations](std::size_t d) {
+    DepartureTest test = equations.test(d);
+    test.claimed_sigma = equations.claimed_sigma(d);
+    return test;
+  };
+  std::vector<std::size_t> found;
+  for (int round = 0; round <= kMostFound; ++round) {
+    std::optional<DepartureTest> worst;
+    std::size_t worst_at = 0;
+    for (std::size_t d = 0; d < equations.departures().size(); ++d) {
+      if (std::find(found.begin(), found.end(), d) != found.end()) continue;
+      DepartureTest test = test_of(d);
+      if (!worst || test.log_chance < worst->log_chance) {
+        worst = test;
+        worst_at = d;
+      }
+      if (round == 0) out.tests.push_back(std::move(test));
+    }
+    if (round == kMostFound || !worst || !(worst->log_chance < log_limit)) break;
+    found.push_back(worst_at);
+    equations.set_free(found);
+  }
+  // What was found first may have stood for what came later: each is tested beside all others.
+  for (std::size_t k = 0; found.size() > 1 && k < found.size();) {
+    const std::vector<std::size_t> others = without(found, found[k]);
+    equations.set_free(others);
+    if (test_of(found[k]).log_chance < log_limit) {
+      ++k;
+    } else {
+      found = others;
+      k = 0;
+    }
+  }
+  for (const std::size_t d : found) {
+    equations.set_free(without(found, d));
+    out.found.push_back(test_of(d));
+  }
+  std::sort(out.found.begin(), out.found.end(), [](const DepartureTest& a, const DepartureTest& b) {
+    return a.log_chance < b.log_chance;
+  });
+  return out;
+}
+
+}  // namespace alidade

@@ -1,0 +1,51 @@
+#pragma once
+// What a place that two pictures show says about calibration and orientations, linearised:
+//   r = seen - expected,   expected = pixel of the second frame that sees what `first` sees
+//   r = J_first e_first + J_second e_second + (P_first + P_second) e_theta + noise
+// e: truth minus estimate, of a frame's (pan, tilt, pan rate, tilt rate) at row 0 and of the
+// parameters (Parameter). P contains what the parameters change of the frame's motion. px, rad, s.
+// Pure; allocates.
+
+#include <vector>
+
+#include "core/model/calibration.h"
+#include "edge_app/verify/place_pairs.h"
+
+namespace alidade {
+
+enum class OrientationFrom { kTelemetry, kAllSamples, kLandmarks };
+
+struct PlaceRow {
+  Vector2<double> at;           // px, in the second picture
+  Vector2<double> moved;        // px, from the first picture to the second
+  Vector2<double> residual;     // px
+  Matrix2<double> covariance;   // px^2, noise
+  Matrix<double, 2, 4> J_first, J_second;
+  Sensitivity<2> P_first, P_second;
+};
+
+struct PairRows {
+  std::size_t first = 0;  // index of the frame
+  std::size_t second = 0;
+  std::vector<PlaceRow> places;  // at least one
+};
+
+[[nodiscard]] inline const FrameOrientation& orientation(const SeenFrame& frame,
+                                                         OrientationFrom from) {
+  switch (from) {
+    case OrientationFrom::kTelemetry:
+      return frame.by_telemetry;
+    case OrientationFrom::kAllSamples:
+      return frame.by_all_samples;
+    case OrientationFrom::kLandmarks:
+      break;
+  }
+  return frame.by_landmarks;
+}
+
+// Pairs of which a frame has no such orientation are left out.
+[[nodiscard]] std::vector<PairRows> pair_rows(const std::vector<SeenFrame>& frames,
+                                              const std::vector<PlacePair>& pairs,
+                                              OrientationFrom from);
+
+}  // namespace alidade

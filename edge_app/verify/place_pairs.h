@@ -1,0 +1,33 @@
+#pragma once
+// Places that two pictures of a recording both show. Corners of the first picture are looked for in
+// the second, where the orientations of both say they are (image room: FAST corners, patch
+// alignment). They are chosen anew, and are not the landmarks that OE mode used. Pictures lie at
+// least kLeastGap_s apart, so that neighbours do not count as returns. Pixels as CONVENTIONS.md has
+// them. Pure; allocates.
+
+#include <vector>
+
+#include "core/model/linear_algebra.h"
+#include "edge_app/verify/seen_frame.h"
+
+namespace alidade {
+
+inline constexpr double kLeastGap_s = 1;
+
+struct PlaceMatch {
+  Vector2<double> first;        // px, where it is in the first picture
+  Vector2<double> second;       // px, where it was found in the second
+  Matrix2<double> covariance;   // px^2, of `second`, by noise of both pictures
+};
+
+struct PlacePair {
+  std::size_t first = 0;  // index of the frame
+  std::size_t second = 0;
+  std::vector<PlaceMatch> places;
+};
+
+// Each frame has a few partners, at all distances in time. A pair with fewer than six places that
+// agree is left out.
+[[nodiscard]] std::vector<PlacePair> match_places(const std::vector<SeenFrame>& frames);
+
+}  // namespace alidade

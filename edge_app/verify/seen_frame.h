@@ -1,0 +1,61 @@
+#pragma once
+// SeenFrame: a frame of the recording with its picture and what both modes say of its orientation;
+// PT mode also with the samples after the frame, which know more than a live step does.
+// FrameCollection: those frames of a replay that are compared with each other, evenly over the
+// recording, as many as fit into 256 MB. Allocates. One thread.
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "core/model/angle.h"
+#include "core/model/mechanics.h"
+#include "core/realtime/frame_orientation.h"
+#include "core/realtime/image/image_view.h"
+#include "edge_app/record/orientation_record.h"
+
+namespace alidade {
+
+struct SeenFrame {
+  double time_s = 0;        // s, image clock; capture of row 0
+  double time_sigma_s = 0;  // s; may be shared with all other frames
+  FrameOrientation by_telemetry;    // by the samples that had come when the frame came
+  FrameOrientation by_all_samples;  // by those after it, too
+  FrameOrientation by_landmarks;    // mode kNone: landmarks did not hold
+  PanTilt<double> heading{0, 0};    // -1 or 1: the way each axis turned last; 0: not known
+  std::vector<std::uint8_t> luma;   // row by row, without gaps
+  [[nodiscard]] ImageView image() const {
+    const Camera<double>& camera = by_telemetry.calibration.camera;
+    return {luma.data(), camera.width, camera.height, camera.width};
+  }
+};
+
+class FrameCollection {
+ public:
+  // frames: of the recording. angle_sigma_rad: noise of a measured angle; what it can make is no
+  // movement.
+  FrameCollection(std::size_t frames, int width, int height, double angle_sigma_rad);
+
+  // The next frame's records. image: not valid() if there is none.
+  void add(const OrientationRecord& by_landmarks, const OrientationRecord& by_telemetry,
+           const OrientationRecord& by_all_samples, const ImageView& image);
+
+  [[nodiscard]] const std::vector<SeenFrame>& frames() const { return frames_; }
+
+ private:
+  void note_heading(const PanTilt<double>& angle);
+
+  std::size_t of_recording_;
+  std::size_t wanted_;
+  double clear_rad_;
+  std::size_t next_ = 0;    // of the recording
+  std::size_t chosen_ = 0;  // so far, with or without success
+  std::optional<double> begin_s_;
+  bool has_angle_ = false;
+  PanTilt<double> turned_from_;  // the farthest point of the present direction
+  PanTilt<double> heading_{0, 0};
+  std::vector<SeenFrame> frames_;
+};
+
+}  // namespace alidade

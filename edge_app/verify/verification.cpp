@@ -1,0 +1,459 @@
+#include "edge_app/verify/verification.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/model/angle.h"
+
+namespace alidade {
+namespace {
+
+constexpr double kFalseAlarms = 0.01;  // of all comparisons together
+constexpr double kOtherPlace = 0.3;    // of the picture's width or height
+constexpr double kOtherSpeed = 0.5;    // of the largest difference of speeds
+constexpr double kOtherZoom = 0.02;    // of f
+constexpr double kSameZoom = 1e-3;     // likewise
+constexpr double kSharpEnough = 20;    // times the claimed sigma; a blunter test says nothing
+constexpr double kDegrees = 180 / kPi;
+
+double log_f(const SeenFrame& frame) {
+  return std::log(frame.by_telemetry.calibration.camera.focal_length);
+}
+
+Vector2<double> rate_difference(const SeenFrame& a, const SeenFrame& b) {
+  return (a.by_telemetry.rate.vector() - b.by_telemetry.rate.vector()).cwiseAbs();
+}
+
+bool is_of_kind(ReturnKind kind, const std::vector<SeenFrame>& frames, const PairRows& pair,
+                const Vector2<double>& largest_rate_difference) {
+  const SeenFrame& first = frames[pair.first];
+  const SeenFrame& second = frames[pair.second];
+  const Camera<double>& camera = first.by_telemetry.calibration.camera;
+  switch (kind) {
+    case ReturnKind::kAll:
+      return true;
+    case ReturnKind::kOtherSide:
+      return first.heading.pan * second.heading.pan < 0 ||
+             first.heading.tilt * second.heading.tilt < 0;
+    case ReturnKind::kOtherSpeed:
+      return (rate_difference(first, second).array() >
+              kOtherSpeed * largest_rate_difference.array())
+          .any();
+    case ReturnKind::kOtherPlace: {
+      Vector2<double> moved = Vector2<double>::Zero();
+      for (const PlaceRow& place : pair.places) moved += place.moved.cwiseAbs();
+      moved /= static_cast<double>(pair.places.size());
+      return moved.x() > kOtherPlace * camera.width || moved.y() > kOtherPlace * camera.height;
+    }
+    case ReturnKind::kOtherZoom:
+      return std::abs(log_f(first) - log_f(second)) > kOtherZoom;
+    case ReturnKind::kCount:
+      break;
+  }
+  return false;
+}
+
+std::vector<PairRows> of_kind(ReturnKind kind, const std::vector<SeenFrame>& frames,
+                              const std::vector<PairRows>& pairs) {
+  Vector2<double> largest(1e-12, 1e-12);
+  for (const PairRows& pair : pairs)
+    largest = largest.cwiseMax(rate_difference(frames[pair.first], frames[pair.second]));
+  std::vector<PairRows> out;
+  for (const PairRows& pair : pairs) {
+    if (is_of_kind(kind, frames, pair, largest)) out.push_back(pair);
+  }
+  return out;
+}
+
+// Those of the lens at which most frames were taken.
+std::vector<PairRows> at_one_zoom(const std::vector<SeenFrame>& frames,
+                                  const std::vector<PairRows>& pairs, std::size_t* reference) {
+  std::vector<std::size_t> order(frames.size());
+  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+  std::sort(order.begin(), order.end(),
+            [&](std::size_t a, std::size_t b) { return log_f(frames[a]) < log_f(frames[b]); });
+  std::size_t most = 0;
+  for (std::size_t low = 0, high = 0; low < order.size(); ++low) {
+    while (high < order.size() &&
+           log_f(frames[order[high]]) <= log_f(frames[order[low]]) + kSameZoom) {
+      ++high;
+    }
+    if (high - low > most) *reference = order[(low + high) / 2];
+    most = std::max(most, high - low);
+  }
+  std::vector<PairRows> out;
+  for (const PairRows& pair : pairs) {
+    const auto is_there = [&](std::size_t frame) {
+      return std::abs(log_f(frames[frame]) - log_f(frames[*reference])) <= kSameZoom;
+    };
+    if (is_there(pair.first) && is_there(pair.second)) out.push_back(pair);
+  }
+  return out;
+}
+
+const char* mode_of(OrientationFrom from) {
+  return from == OrientationFrom::kLandmarks ? "OE mode" : "PT mode";
+}
+
+std::string sentence_of(const ClaimComparison& comparison) {
+  const ClaimResult& r = comparison.result;
+  const std::string where =
+      fmt::format("{}, {}", name_of(comparison.kind), mode_of(comparison.from));
+  if (comparison.verdict == Verdict::kNotJudged) {
+    return fmt::format("{}: not judged; {} pairs, worth {:.0f} independent numbers ({} and {:.0f} "
+                       "are needed)",
+                       where, r.pairs, r.freedom, kLeastPairs, kLeastFreedom);
+  }
+  return fmt::format(
+      "{}: directions of the same place differ by {:.2f} times what sigma claims (95 %: {:.2f} to "
+      "{:.2f}){}",
+      where, r.ratio, r.low, r.high,
+      comparison.verdict == Verdict::kContradicted ? ", more than chance" : "");
+}
+
+double largest_sigmas(const DepartureTest& test) {
+  double out = 0;
+  for (std::size_t i = 0; i < test.size.size(); ++i) {
+    if (test.sigma[i] > 0) out = std::max(out, std::abs(test.size[i]) / test.sigma[i]);
+  }
+  return out;
+}
+
+std::string sentence_of(const ModelComparison& comparison) {
+  const DepartureTest& test = comparison.test;
+  const char* name = name_of(test.departure);
+  switch (comparison.verdict) {
+    case Verdict::kNotJudged:
+      return fmt::format("{}: not judged; this recording does not show it", name);
+    case Verdict::kHolds:
+      return fmt::format("{}: as calibrated; by this recording alone {}", name, size_of(test));
+    case Verdict::kContradicted:
+      return fmt::format("{}: contradicted; by this recording alone {}", name, size_of(test));
+  }
+  return name;
+}
+
+Verdict verdict_of(const DepartureTest& test, double log_limit) {
+  if (test.freedom == 0) return Verdict::kNotJudged;
+  if (test.log_chance < log_limit) return Verdict::kContradicted;
+  const bool is_blunt = test.claimed_sigma > 0 && !test.sigma.empty() &&
+                        test.sigma.front() > kSharpEnough * test.claimed_sigma;
+  return is_blunt ? Verdict::kNotJudged : Verdict::kHolds;
+}
+
+std::vector<Matrix4<double>> motion_covariances(const std::vector<SeenFrame>& frames,
+                                                OrientationFrom from) {
+  std::vector<Matrix4<double>> out;
+  for (const SeenFrame& frame : frames)
+    out.emplace_back(orientation(frame, from).motion_covariance.topLeftCorner<4, 4>());
+  return out;
+}
+
+// Telemetry's samples have so much to say of slow errors; the frames' covariances, taken as
+// independent, must not claim more.
+double motion_inflation(const VerifyInput& input, OrientationFrom from) {
+  if (input.frames.size() < 2 || !(input.telemetry_sigma_rad > 0)) return 1;
+  std::vector<double> variances;
+  for (const SeenFrame& frame : input.frames)
+    variances.push_back(orientation(frame, from).motion_covariance(0, 0));
+  const auto middle = variances.begin() + static_cast<std::ptrdiff_t>(variances.size() / 2);
+  std::nth_element(variances.begin(), middle, variances.end());
+  const double duration_s = input.frames.back().time_s - input.frames.front().time_s;
+  const double of_frames = static_cast<double>(input.frames.size()) / *middle;
+  const double of_samples = std::max(2.0, duration_s * input.telemetry_rate_hz) /
+                            (input.telemetry_sigma_rad * input.telemetry_sigma_rad);
+  return std::max(1.0, of_frames / of_samples);
+}
+
+struct Extent {
+  double pan = 0, tilt = 0;    // rad
+  double reversals = 0;        // of either axis
+};
+
+Extent extent_of(const std::vector<SeenFrame>& frames) {
+  Extent out;
+  if (frames.empty()) return out;
+  const auto [left, right] = std::minmax_element(
+      frames.begin(), frames.end(), [](const SeenFrame& a, const SeenFrame& b) {
+        return a.by_telemetry.angle.pan < b.by_telemetry.angle.pan;
+      });
+  const auto [low, high] = std::minmax_element(
+      frames.begin(), frames.end(), [](const SeenFrame& a, const SeenFrame& b) {
+        return a.by_telemetry.angle.tilt < b.by_telemetry.angle.tilt;
+      });
+  out.pan = right->by_telemetry.angle.pan - left->by_telemetry.angle.pan;
+  out.tilt = high->by_telemetry.angle.tilt - low->by_telemetry.angle.tilt;
+  for (std::size_t i = 1; i < frames.size(); ++i) {
+    if (frames[i].heading.pan * frames[i - 1].heading.pan < 0) ++out.reversals;
+    if (frames[i].heading.tilt * frames[i - 1].heading.tilt < 0) ++out.reversals;
+  }
+  return out;
+}
+
+std::vector<std::string> advice_for(const VerifyInput& input, const Verification& verification) {
+  std::vector<std::string> out;
+  if (input.frames.size() < 2) {
+    out.emplace_back("record for 30 s at least, with pictures and telemetry, while the head turns");
+    return out;
+  }
+  const Extent extent = extent_of(input.frames);
+  const Camera<double>& camera = input.frames.front().by_telemetry.calibration.camera;
+  const double width = camera.width / camera.focal_length;
+  const double height = camera.height / camera.focal_length;
+  if (extent.pan < width / 2)
+    out.push_back(fmt::format("pan over {:.2g} degrees or more and back", width * kDegrees));
+  if (extent.tilt < height / 2)
+    out.push_back(fmt::format("tilt over {:.2g} degrees or more and back", height * kDegrees));
+  if (extent.reversals < 4)
+    out.emplace_back("turn back several times, so that places are passed from both sides");
+  if (verification.pairs < kLeastPairs && out.empty())
+    out.emplace_back("record longer, over a scene with more texture");
+  return out;
+}
+
+const ClaimComparison* worst_claim(const Verification& verification) {
+  const ClaimComparison* worst = nullptr;
+  for (const ClaimComparison& each : verification.claims) {
+    if (each.verdict == Verdict::kNotJudged) continue;
+    const bool is_worse =
+        worst == nullptr || (each.verdict == Verdict::kContradicted) >
+                                (worst->verdict == Verdict::kContradicted) ||
+        (each.verdict == worst->verdict && each.result.ratio > worst->result.ratio);
+    if (is_worse) worst = &each;
+  }
+  return worst;
+}
+
+std::string summary_of(const Verification& v) {
+  const ClaimComparison* worst = worst_claim(v);
+  const std::string differ =
+      worst == nullptr ? ""
+                       : fmt::format("directions of the same place differ by {:.2f} times what "
+                                     "sigma claims (limit {:.2f}; {}, {})",
+                                     worst->result.ratio,
+                                     worst->result.ratio / std::max(1e-9, worst->result.low),
+                                     name_of(worst->kind), mode_of(worst->from));
+  switch (v.verdict) {
+    case Verdict::kNotJudged:
+      return fmt::format("not judged: {} pairs of pictures show the same places again ({} are "
+                         "needed)",
+                         v.pairs, kLeastPairs);
+    case Verdict::kHolds:
+      return "sigmas hold: " + differ;
+    case Verdict::kContradicted:
+      break;
+  }
+  std::string out = "contradicted: ";
+  if (worst != nullptr && worst->verdict == Verdict::kContradicted) out += differ;
+  for (std::size_t i = 0; i < v.found.size(); ++i) {
+    if (i == 0 && out.size() > 14) out += "; ";
+    out += (i == 0 ? "likeliest cause: " : ", then: ");
+    out += fmt::format("{} ({})", name_of(v.found[i].departure), size_of(v.found[i]));
+  }
+  if (v.found.empty()) out += "; none of the causes that are known here explains it";
+  return out;
+}
+
+}  // namespace
+
+const char* to_string(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::kHolds:
+      return "holds";
+    case Verdict::kContradicted:
+      return "contradicted";
+    case Verdict::kNotJudged:
+      return "not judged";
+  }
+  return "unknown";
+}
+
+const char* name_of(ReturnKind kind) {
+  switch (kind) {
+    case ReturnKind::kAll:
+      return "all returns";
+    case ReturnKind::kOtherSide:
+      return "returns from the other side";
+    case ReturnKind::kOtherSpeed:
+      return "returns at another speed";
+    case ReturnKind::kOtherPlace:
+      return "elsewhere in the picture";
+    case ReturnKind::kOtherZoom:
+      return "returns at another zoom";
+    case ReturnKind::kCount:
+      break;
+  }
+  return "unknown";
+}
+
+const char* name_of(Departure departure) {
+  switch (departure) {
+    case Departure::kFocalLength:
+      return "focal length";
+    case Departure::kDistortion:
+      return "radial distortion";
+    case Departure::kCentre:
+      return "optical centre";
+    case Departure::kAspect:
+      return "aspect, or the scale of one axis";
+    case Departure::kLineDelay:
+      return "line delay";
+    case Departure::kPanAxis:
+      return "pan axis";
+    case Departure::kTiltAxis:
+      return "tilt axis";
+    case Departure::kClockOffset:
+      return "clock offset";
+    case Departure::kPanGear:
+      return "pan's error over the angle (gear)";
+    case Departure::kTiltGear:
+      return "tilt's error over the angle (gear)";
+    case Departure::kPanPlay:
+      return "play of pan";
+    case Departure::kTiltPlay:
+      return "play of tilt";
+    case Departure::kFocalDrift:
+      return "focal length that drifts";
+    case Departure::kPanDrift:
+      return "zero of pan that drifts";
+    case Departure::kTiltDrift:
+      return "zero of tilt that drifts";
+    case Departure::kCount:
+      break;
+  }
+  return "unknown";
+}
+
+std::string size_of(const DepartureTest& test) {
+  if (test.size.empty()) return "no size";
+  const auto one = [&test](double unit, const char* name) {
+    return fmt::format("off by {:.3g} +- {:.2g}{}", unit * test.size.front(),
+                       unit * test.sigma.front(), name);
+  };
+  const auto curve = [&test](double unit, const char* name) {
+    // What all knots have in common is no error.
+    double mean = 0;
+    for (const double size : test.size) mean += size / static_cast<double>(test.size.size());
+    double square = 0;
+    double sigma = 0;
+    for (std::size_t i = 0; i < test.size.size(); ++i) {
+      square += (test.size[i] - mean) * (test.size[i] - mean);
+      sigma += test.sigma[i] * test.sigma[i];
+    }
+    const auto n = static_cast<double>(test.size.size());
+    return fmt::format("RMS {:.3g}{}, {:.1f} sigmas at most", unit * std::sqrt(square / n), name,
+                       largest_sigmas(test));
+  };
+  constexpr double kMilli = 1e3;
+  constexpr double kMicro = 1e6;
+  switch (test.departure) {
+    case Departure::kFocalLength:
+      return one(1, " px");
+    case Departure::kCentre:
+      return fmt::format("off by ({:.3g}, {:.3g}) +- ({:.2g}, {:.2g}) px", test.size[0],
+                         test.size[1], test.sigma[0], test.sigma[1]);
+    case Departure::kDistortion:
+    case Departure::kAspect:
+      return one(1, "");
+    case Departure::kLineDelay:
+      return one(kMicro, " us/row");
+    case Departure::kPanAxis:
+    case Departure::kTiltAxis:
+      return fmt::format("off by ({:.3g}, {:.3g}) +- ({:.2g}, {:.2g}) mrad",
+                         kMilli * test.size[0], kMilli * test.size[1], kMilli * test.sigma[0],
+                         kMilli * test.sigma[1]);
+    case Departure::kClockOffset:
+      return one(kMilli, " ms");
+    case Departure::kPanPlay:
+    case Departure::kTiltPlay:
+      return fmt::format("{:.3g} +- {:.2g} mrad", kMilli * std::abs(test.size.front()),
+                         kMilli * test.sigma.front());
+    case Departure::kPanGear:
+    case Departure::kTiltGear:
+    case Departure::kPanDrift:
+    case Departure::kTiltDrift:
+      return curve(kMilli, " mrad");
+    case Departure::kFocalDrift:
+      return curve(1, " px");
+    case Departure::kCount:
+      break;
+  }
+  return "";
+}
+
+Verification verify(const VerifyInput& input) {
+  Verification out;
+  const std::vector<SeenFrame>& frames = input.frames;
+  const std::vector<PlacePair> pairs = match_places(frames);
+  out.by_landmarks = pair_rows(frames, pairs, OrientationFrom::kLandmarks);
+  out.by_telemetry = pair_rows(frames, pairs, OrientationFrom::kTelemetry);
+  out.by_all_samples = pair_rows(frames, pairs, OrientationFrom::kAllSamples);
+  out.pairs = static_cast<int>(out.by_telemetry.size());
+  constexpr int kKinds = static_cast<int>(ReturnKind::kCount);
+  out.chance_limit = kFalseAlarms / (2 * kKinds + kDepartureCount);
+  const double log_limit = std::log(out.chance_limit);
+  if (!out.by_telemetry.empty()) {
+    std::size_t reference = 0;
+    const std::vector<PairRows> one_zoom = at_one_zoom(frames, out.by_all_samples, &reference);
+    const Calibration& calibration = frames[reference].by_telemetry.calibration;
+    const ModelCheckResult model =
+        check_model(frames, one_zoom, calibration, input.telemetry_error,
+                    motion_inflation(input, OrientationFrom::kAllSamples), log_limit);
+    out.places = model.places;
+    out.noise_ratio = model.noise_ratio;
+    out.found = model.found;
+    for (const DepartureTest& test : model.tests)
+      out.model.push_back({verdict_of(test, log_limit), test, ""});
+    const double noise_factor = std::max(1.0, model.noise_ratio * model.noise_ratio);
+    for (const OrientationFrom from : {OrientationFrom::kLandmarks, OrientationFrom::kTelemetry}) {
+      const std::vector<PairRows>& all =
+          from == OrientationFrom::kLandmarks ? out.by_landmarks : out.by_telemetry;
+      for (int kind = 0; kind < kKinds; ++kind) {
+        ClaimComparison comparison;
+        comparison.kind = static_cast<ReturnKind>(kind);
+        comparison.from = from;
+        comparison.result =
+            check_claims(pair_means(of_kind(comparison.kind, frames, all), noise_factor),
+                         motion_covariances(frames, from), calibration.covariance,
+                         from == OrientationFrom::kTelemetry ? motion_inflation(input, from) : 1,
+                         calibration.camera.focal_length);
+        const ClaimResult& result = comparison.result;
+        if (result.pairs >= kLeastPairs && result.freedom >= kLeastFreedom) {
+          comparison.verdict =
+              result.log_chance < log_limit ? Verdict::kContradicted : Verdict::kHolds;
+        }
+        comparison.sentence = sentence_of(comparison);
+        out.claims.push_back(std::move(comparison));
+      }
+    }
+  }
+  const bool is_enough = out.pairs >= kLeastPairs;
+  if (is_enough) out.verdict = Verdict::kHolds;
+  for (ModelComparison& comparison : out.model) {
+    if (!is_enough) comparison.verdict = Verdict::kNotJudged;
+    comparison.sentence = sentence_of(comparison);
+    if (comparison.verdict == Verdict::kContradicted) out.verdict = Verdict::kContradicted;
+  }
+  for (const ClaimComparison& comparison : out.claims) {
+    if (comparison.verdict == Verdict::kContradicted) out.verdict = Verdict::kContradicted;
+  }
+  if (!is_enough) out.found.clear();
+  out.advice = advice_for(input, out);
+  out.sentence = summary_of(out);
+  return out;
+}
+
+std::string verification_text(const Verification& verification) {
+  std::string out = fmt::format("{}\n", verification.sentence);
+  for (const ClaimComparison& comparison : verification.claims) {
+    if (comparison.result.pairs > 0) out += fmt::format("  {}\n", comparison.sentence);
+  }
+  for (const ModelComparison& comparison : verification.model)
+    out += fmt::format("  {}\n", comparison.sentence);
+  for (const std::string& advice : verification.advice) out += fmt::format("advice: {}\n", advice);
+  return out;
+}
+
+}  // namespace alidade

@@ -1,0 +1,72 @@
+#include "edge_app/verify/verification_json.h"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+namespace alidade {
+namespace {
+
+using nlohmann::ordered_json;
+
+ordered_json to_json(const ClaimComparison& comparison) {
+  const ClaimResult& r = comparison.result;
+  ordered_json json;
+  json["returns"] = name_of(comparison.kind);
+  json["mode"] = comparison.from == OrientationFrom::kLandmarks ? "OE" : "PT";
+  json["verdict"] = to_string(comparison.verdict);
+  json["pairs"] = r.pairs;
+  json["frames"] = r.frames;
+  json["independent_numbers"] = r.freedom;
+  json["rms_px"] = r.rms_px;
+  json["rms_deg"] = r.rms_deg;
+  json["claimed_px"] = r.claimed_px;
+  json["ratio"] = r.ratio;
+  json["ratio_95"] = {r.low, r.high};
+  json["chance"] = std::exp(r.log_chance);
+  json["sentence"] = comparison.sentence;
+  return json;
+}
+
+ordered_json to_json(const DepartureTest& test) {
+  ordered_json json;
+  json["departure"] = name_of(test.departure);
+  json["chi_square"] = test.chi_square;
+  json["freedom"] = test.freedom;
+  json["chance"] = std::exp(test.log_chance);
+  json["log_chance"] = test.log_chance;
+  json["noise_scatter"] = test.scatter;
+  json["size"] = test.size;
+  json["sigma"] = test.sigma;
+  if (!test.at.empty()) json["at"] = test.at;
+  if (test.claimed_sigma > 0) json["claimed_sigma"] = test.claimed_sigma;
+  return json;
+}
+
+}  // namespace
+
+std::string verification_json(const Verification& verification,
+                              const std::vector<std::pair<std::string, std::string>>& files) {
+  ordered_json json;
+  json["verdict"] = to_string(verification.verdict);
+  json["sentence"] = verification.sentence;
+  json["advice"] = verification.advice;
+  json["pairs"] = verification.pairs;
+  json["places"] = verification.places;
+  json["picture_noise_ratio"] = verification.noise_ratio;
+  json["chance_limit"] = verification.chance_limit;
+  json["returns"] = ordered_json::array();
+  for (const ClaimComparison& claim : verification.claims) json["returns"].push_back(to_json(claim));
+  json["model"] = ordered_json::array();
+  for (const ModelComparison& comparison : verification.model) {
+    ordered_json each = to_json(comparison.test);
+    each["verdict"] = to_string(comparison.verdict);
+    each["sentence"] = comparison.sentence;
+    json["model"].push_back(std::move(each));
+  }
+  json["causes"] = ordered_json::array();
+  for (const DepartureTest& found : verification.found) json["causes"].push_back(to_json(found));
+  for (const auto& [kind, path] : files) json["files"][kind] = path;
+  return json.dump(-1, ' ', false, ordered_json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace alidade

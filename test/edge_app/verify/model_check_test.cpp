@@ -1,0 +1,109 @@
+// Whether departures are found where there are some, by their name and size, and only there.
+
+#include "edge_app/verify/model_check.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "test/edge_app/verify/seen_places.h"
+
+namespace alidade {
+namespace {
+
+constexpr double kLimit = 4e-4;
+
+ModelCheckResult check(std::uint64_t seed, const test::PlaceErrors& errors) {
+  const test::SeenPlaces seen = test::see_places(seed, errors);
+  return check_model(seen.frames, pair_rows(seen.frames, seen.pairs, OrientationFrom::kAllSamples),
+                     seen.calibration, {}, 1, std::log(kLimit));
+}
+
+// Of the departure that is found, and of no other one before it.
+DepartureTest only_cause(const test::PlaceErrors& errors, Departure departure) {
+  const ModelCheckResult result = check(7, errors);
+  if (result.found.empty() || result.found.front().departure != departure) {
+    ADD_FAILURE() << "not found: " << static_cast<int>(departure);
+    return {};
+  }
+  return result.found.front();
+}
+
+test::PlaceErrors off(Parameter parameter, double by) {
+  test::PlaceErrors errors;
+  errors.parameters[index(parameter)] = by;
+  return errors;
+}
+
+TEST(ModelCheck, FindsNothingMoreOftenThanChanceHasItInAModelThatHolds) {
+  constexpr int kRuns = 40;
+  constexpr double kLevel = 0.05;
+  int tests = 0;
+  int alarms = 0;
+  int found = 0;
+  for (int run = 0; run < kRuns; ++run) {
+    const ModelCheckResult result = check(static_cast<std::uint64_t>(run + 1), {});
+    for (const DepartureTest& test : result.tests) {
+      if (test.freedom == 0) continue;
+      ++tests;
+      if (test.log_chance < std::log(kLevel)) ++alarms;
+    }
+    found += static_cast<int>(result.found.size());
+  }
+  EXPECT_EQ(tests, kRuns * kDepartureCount);
+  // Tests of one run share its data, up to all of them: binomial for the runs, 4 sigmas.
+  EXPECT_LE(alarms, kLevel * tests + 4 * kDepartureCount * std::sqrt(kRuns * kLevel / 4));
+  EXPECT_GE(alarms, 1);
+  // 1 % of the runs by Bonferroni; three of 40 have a chance of 0.7 %.
+  EXPECT_LT(found, 3);
+}
+
+TEST(ModelCheck, NamesAWrongFocalLength) {
+  const DepartureTest test = only_cause(off(Parameter::kFocalLength, 8), Departure::kFocalLength);
+  ASSERT_EQ(test.size.size(), 1U);
+  EXPECT_NEAR(test.size[0], 8, 4 * std::hypot(test.sigma[0], 0.4));
+}
+
+TEST(ModelCheck, NamesAWrongClockOffset) {
+  const DepartureTest test =
+      only_cause(off(Parameter::kClockOffset, 3e-3), Departure::kClockOffset);
+  ASSERT_EQ(test.size.size(), 1U);
+  EXPECT_NEAR(test.size[0], 3e-3, 4 * std::hypot(test.sigma[0], 1e-4));
+}
+
+TEST(ModelCheck, NamesAWrongLens) {
+  static_cast<void>(only_cause(off(Parameter::kRadialDistortion, 3), Departure::kDistortion));
+  static_cast<void>(only_cause(off(Parameter::kCentreU, 20), Departure::kCentre));
+  static_cast<void>(only_cause(off(Parameter::kLineDelay, 3e-6), Departure::kLineDelay));
+}
+
+TEST(ModelCheck, NamesAGear) {
+  test::PlaceErrors errors;
+  errors.pan_gear_rad = 3e-4;
+  const DepartureTest test = only_cause(errors, Departure::kPanGear);
+  ASSERT_EQ(test.at.size(), test.size.size());
+  // Knots give a sine of 8 knots a period to a fifth; what all have in common means nothing.
+  double mean = 0;
+  for (const double size : test.size) mean += size / static_cast<double>(test.size.size());
+  double largest = 0;
+  for (const double size : test.size) largest = std::max(largest, std::abs(size - mean));
+  EXPECT_GT(largest, 2e-4);
+  EXPECT_LT(largest, 5e-4);
+}
+
+TEST(ModelCheck, NamesPlay) {
+  test::PlaceErrors errors;
+  errors.tilt_play_rad = 3e-4;
+  const DepartureTest test = only_cause(errors, Departure::kTiltPlay);
+  ASSERT_EQ(test.size.size(), 1U);
+  EXPECT_NEAR(test.size[0], 3e-4, 4 * test.sigma[0]);
+}
+
+TEST(ModelCheck, SaysNothingWithoutPairs) {
+  const ModelCheckResult result = check_model({}, {}, test::verified_calibration(), {}, 1, -8);
+  EXPECT_TRUE(result.tests.empty());
+  EXPECT_TRUE(result.found.empty());
+}
+
+}  // namespace
+}  // namespace alidade

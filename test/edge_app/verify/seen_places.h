@@ -1,0 +1,140 @@
+#pragma once
+// Frames and places as a camera with known errors would have them, without pictures: for tests of
+// the statistics. Errors are drawn from the covariances that the frames and the calibration claim.
+
+#include <Eigen/Cholesky>
+#include <cmath>
+#include <functional>
+#include <random>
+#include <vector>
+
+#include "core/realtime/frame_orientation.h"
+#include "edge_app/verify/place_pairs.h"
+
+namespace alidade::test {
+
+struct SeenPlaces {
+  Calibration calibration;  // the one that is verified
+  std::vector<SeenFrame> frames;
+  std::vector<PlacePair> pairs;
+};
+
+struct PlaceErrors {
+  Eigen::Matrix<double, kParameterCount, 1> parameters =
+      Eigen::Matrix<double, kParameterCount, 1>::Zero();  // truth minus calibration, and what is drawn
+  double pan_gear_rad = 0;   // telemetry minus truth: times the sine of 3 periods over the range
+  double tilt_play_rad = 0;  // b of an encoder on the motor
+  double growth = 1;         // of the frames' errors against their covariance
+};
+
+inline Calibration verified_calibration() {
+  Calibration out;
+  out.camera.focal_length = 4000;
+  out.camera.width = 640;
+  out.camera.height = 360;
+  out.camera.distortion.only_term() = 5;
+  out.line_delay = 4e-5;
+  const auto sigma = [&out](Parameter parameter, double value) {
+    out.covariance(index(parameter), index(parameter)) = value * value;
+  };
+  sigma(Parameter::kFocalLength, 0.4);
+  sigma(Parameter::kRadialDistortion, 0.05);
+  sigma(Parameter::kLineDelay, 5e-8);
+  for (const Parameter axis :
+       {Parameter::kPanAxis0, Parameter::kPanAxis1, Parameter::kTiltAxis0, Parameter::kTiltAxis1})
+    sigma(axis, 1e-4);
+  sigma(Parameter::kClockOffset, 1e-4);
+  return out;
+}
+
+inline Calibration moved(const Calibration& from,
+                         const Eigen::Matrix<double, kParameterCount, 1>& by) {
+  Calibration out = from;
+  out.camera.focal_length += by[index(Parameter::kFocalLength)];
+  out.camera.distortion.only_term() += by[index(Parameter::kRadialDistortion)];
+  out.camera.centre_u += by[index(Parameter::kCentreU)];
+  out.camera.centre_v += by[index(Parameter::kCentreV)];
+  out.line_delay += by[index(Parameter::kLineDelay)];
+  out.mechanics.pan_axis =
+      direction_plus(out.mechanics.pan_axis, {by[index(Parameter::kPanAxis0)],
+                                              by[index(Parameter::kPanAxis1)]});
+  out.mechanics.tilt_axis =
+      direction_plus(out.mechanics.tilt_axis, {by[index(Parameter::kTiltAxis0)],
+                                               by[index(Parameter::kTiltAxis1)]});
+  return out;
+}
+
+inline SeenPlaces see_places(std::uint64_t seed, const PlaceErrors& errors) {
+  constexpr int kFrames = 48;
+  constexpr int kPlaces = 8;
+  constexpr double kPicture_px = 0.05;
+  constexpr double kAngle_rad = 3e-5;
+  constexpr double kRate_rad_s = 1e-3;
+  constexpr double kReach_rad = 0.1;
+  std::mt19937_64 generator(seed);
+  std::normal_distribution<double> normal;
+  SeenPlaces out;
+  out.calibration = verified_calibration();
+  Eigen::Matrix<double, kParameterCount, 1> off = errors.parameters;
+  for (int i = 0; i < kParameterCount; ++i)
+    off[i] += std::sqrt(out.calibration.covariance(i, i)) * normal(generator);
+  const Calibration truth = moved(out.calibration, off);
+
+  std::vector<FrameOrientation> true_frames;
+  for (int i = 0; i < kFrames; ++i) {
+    const double t = i * 0.25;
+    FrameOrientation is;
+    is.mode = OrientationMode::kPt;
+    is.calibration = truth;
+    is.angle = {kReach_rad * std::sin(1.1 * t), 0.6 * kReach_rad * std::sin(1.7 * t + 1)};
+    is.rate = {1.1 * kReach_rad * std::cos(1.1 * t), 1.02 * kReach_rad * std::cos(1.7 * t + 1)};
+    true_frames.push_back(is);
+
+    SeenFrame frame;
+    frame.time_s = t;
+    frame.heading = {is.rate.pan > 0 ? 1.0 : -1.0, is.rate.tilt > 0 ? 1.0 : -1.0};
+    FrameOrientation& seen = frame.by_all_samples;
+    seen = is;
+    seen.calibration = out.calibration;
+    seen.motion_covariance.diagonal().head<2>().setConstant(kAngle_rad * kAngle_rad);
+    seen.motion_covariance.diagonal().segment<2>(2).setConstant(kRate_rad_s * kRate_rad_s);
+    seen.motion_sensitivity = telemetry_sensitivity(out.calibration.mechanics, is.motion());
+    const Eigen::Matrix<double, 6, 1> by_parameters = seen.motion_sensitivity * off;
+    seen.angle.pan -= by_parameters[0] + errors.growth * kAngle_rad * normal(generator);
+    seen.angle.tilt -= by_parameters[1] + errors.growth * kAngle_rad * normal(generator);
+    seen.rate.pan -= by_parameters[2] + errors.growth * kRate_rad_s * normal(generator);
+    seen.rate.tilt -= by_parameters[3] + errors.growth * kRate_rad_s * normal(generator);
+    seen.angle.pan += errors.pan_gear_rad * std::sin(3 * kPi * is.angle.pan / kReach_rad);
+    seen.angle.tilt += errors.tilt_play_rad / 2 * frame.heading.tilt;
+    frame.by_telemetry = seen;
+    out.frames.push_back(frame);
+  }
+  std::uniform_real_distribution<double> u(20, 620);
+  std::uniform_real_distribution<double> v(20, 340);
+  for (std::size_t i = 0; i < true_frames.size(); ++i) {
+    int partners = 0;
+    for (std::size_t j = i + 4; j < true_frames.size() && partners < 4; j += 3) {
+      PlacePair pair{i, j, {}};
+      for (int attempt = 0; attempt < 4 * kPlaces; ++attempt) {
+        PlaceMatch place;
+        place.first = {u(generator), v(generator)};
+        place.covariance = Matrix2<double>::Identity() * kPicture_px * kPicture_px;
+        Vector3<double> d;
+        if (true_frames[i].direction(place.first, &d) != ProjectionStatus::kOk) continue;
+        if (true_frames[j].pixel(d, &place.second) != ProjectionStatus::kOk) continue;
+        if (place.second.x() < 0 || place.second.x() > 640 || place.second.y() < 0 ||
+            place.second.y() > 360) {
+          continue;
+        }
+        place.second += kPicture_px * Vector2<double>(normal(generator), normal(generator));
+        if (pair.places.size() < kPlaces) pair.places.push_back(place);
+      }
+      if (pair.places.size() < kPlaces) continue;
+      out.pairs.push_back(pair);
+      ++partners;
+    }
+  }
+  return out;
+}
+
+}  // namespace alidade::test

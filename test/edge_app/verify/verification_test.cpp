@@ -1,0 +1,62 @@
+// What a verification says where nothing can be judged; that its JSON and its page are well formed.
+
+#include "edge_app/verify/verification.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "edge_app/verify/verification_json.h"
+#include "edge_app/verify/verification_report.h"
+
+namespace alidade {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+TEST(Verification, OfNoFramesIsNotJudgedAndSaysWhatWouldServe) {
+  const std::vector<SeenFrame> frames;
+  const Verification verification = verify({"film", "lens.yaml", frames, {}, 1e-4, 20});
+  EXPECT_EQ(verification.verdict, Verdict::kNotJudged);
+  EXPECT_THAT(verification.sentence, HasSubstr("not judged: 0 pairs"));
+  ASSERT_FALSE(verification.advice.empty());
+  EXPECT_THAT(verification.advice.front(), HasSubstr("record for"));
+}
+
+TEST(Verification, OfAHeadAtRestAsksForMotion) {
+  std::vector<SeenFrame> frames(3);
+  for (SeenFrame& frame : frames) {
+    FrameOrientation& is = frame.by_telemetry;
+    is.mode = OrientationMode::kPt;
+    is.calibration.camera = {1000, 1, {}, 64, 48};
+    frame.by_all_samples = is;
+    frame.luma.assign(64 * 48, 100);
+  }
+  const Verification verification = verify({"film", "lens.yaml", frames, {}, 1e-4, 20});
+  EXPECT_EQ(verification.verdict, Verdict::kNotJudged);
+  EXPECT_THAT(verification_text(verification), HasSubstr("advice: pan over 3.7 degrees"));
+}
+
+TEST(Verification, HasJsonAndAPageWithEscapedNames) {
+  Verification verification;
+  verification.sentence = "not judged: <nothing>";
+  verification.pairs = 1;
+  const auto json = nlohmann::json::parse(verification_json(verification, {{"report", "a.html"}}));
+  EXPECT_EQ(json["verdict"], "not judged");
+  EXPECT_EQ(json["files"]["report"], "a.html");
+  const std::string page = verification_report(verification, {"<film>", "1", "today"});
+  EXPECT_THAT(page, HasSubstr("&lt;film&gt;"));
+  EXPECT_THAT(page, Not(HasSubstr("<nothing>")));
+}
+
+TEST(Verification, NamesAllDeparturesAndReturns) {
+  for (int i = 0; i < kDepartureCount; ++i)
+    EXPECT_STRNE(name_of(static_cast<Departure>(i)), "unknown") << i;
+  for (int i = 0; i < static_cast<int>(ReturnKind::kCount); ++i)
+    EXPECT_STRNE(name_of(static_cast<ReturnKind>(i)), "unknown") << i;
+}
+
+}  // namespace
+}  // namespace alidade
