@@ -211,7 +211,7 @@ void SelfCalibration::try_first() {
   }
   // The program ends: nobody need do anything about it.
   if (checked.result.status == CalibrationStatus::kCancelled) return;
-  const CalibrationRefusal refusal = why_refused(checked, session_.frames());
+  const CalibrationRefusal refusal = why_refused(checked, session_.frames(), streams_.repeated_share());
   need_ = refusal.need;
   messages_.say_once(
       (publication_.is_fresh_wanted() ? "no fresh calibration yet" : "not calibrated yet") +

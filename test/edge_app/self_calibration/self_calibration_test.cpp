@@ -361,6 +361,18 @@ TEST(SelfCalibration, DoesNotTakeUpAgainWhatItHasWithdrawn) {
   EXPECT_EQ(feed(&calibration, briefly, how).size(), 1U);
 }
 
+TEST(SelfCalibration, SaysThatPicturesAreRepeatedAndDoesNotBlameTelemetry) {
+  const test::Simulation s = camera();
+  SelfCalibration calibration(options_for(s), nullptr);
+  Feed how;
+  how.converted = 0.6;
+  EXPECT_THAT(feed(&calibration, s, how), IsEmpty());
+  EXPECT_EQ(calibration.report().need, CalibrationNeed::kFreshPictures);
+  EXPECT_THAT(calibration.take_messages(),
+              ::testing::ElementsAre(AllOf(HasSubstr("pictures are repeated: up to 40 %"),
+                                           Not(HasSubstr("positive")))));
+}
+
 // Landmarks that disagree with telemetry then tell of the video's times, not of the camera.
 TEST(SelfCalibration, NeitherWithdrawsNorCalibratesWhileTheDelayWanders) {
   const test::Simulation s = camera();
