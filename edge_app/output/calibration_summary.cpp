@@ -142,10 +142,10 @@ std::vector<std::string> telemetry_error_lines(const TelemetryError& error) {
                          kMilli * curve.unseen_sigma_rad);
     }
     if (play.exists()) {
-      text += fmt::format("{}play of {:.3f} +- {:.3f} mrad, the encoder {}",
-                          text.empty() ? "" : "; ", kMilli * play.width_rad,
-                          kMilli * play.sigma_rad,
-                          play.kind == PlayKind::kMotor ? "on the motor" : "behind the gear");
+      text +=
+          fmt::format("{}play of {:.3f} +- {:.3f} mrad, the encoder {}", text.empty() ? "" : "; ",
+                      kMilli * play.width_rad, kMilli * play.sigma_rad,
+                      play.kind == PlayKind::kMotor ? "on the motor" : "behind the gear");
     }
     return text.empty() ? text : std::string(axis) + ": " + text;
   };

@@ -45,9 +45,10 @@ void error_over_angle(ReportPage& page, int axis, const AngleErrorCurve& curve) 
     samples.push_back({shown * kDegrees, kMilli * (curve.at(angle) + left)});
   }
   highest = std::max(highest, 1e-6);
-  SvgPlot plot(kWide_px, 220, {begin * kDegrees, end * kDegrees,
-                               fmt::format("true {}, deg", axis == 0 ? "pan" : "tilt")},
-               {-1.1 * highest, 1.1 * highest, "telemetry's error, mrad"});
+  SvgPlot plot(
+      kWide_px, 220,
+      {begin * kDegrees, end * kDegrees, fmt::format("true {}, deg", axis == 0 ? "pan" : "tilt")},
+      {-1.1 * highest, 1.1 * highest, "telemetry's error, mrad"});
   plot.area(low, high, axis_colour(axis));
   plot.level(0);
   plot.dots(samples, "faint");
@@ -60,7 +61,7 @@ void error_over_angle(ReportPage& page, int axis, const AngleErrorCurve& curve) 
 
 // Reading less camera, to and fro once.
 void loop_of_play(ReportPage& page, int axis, const Play& play) {
-  constexpr int kSteps = 200;  // each way
+  constexpr int kSteps = 200;   // each way
   constexpr double kReach = 2;  // widths, either way
   const double width = play.width_rad;
   const bool on_motor = play.kind == PlayKind::kMotor;

@@ -150,7 +150,7 @@ class Pipeline {
   // Guarded by summary_mutex_.
   std::shared_ptr<const ZoomCurve> zoom_curve_;
   std::shared_ptr<const TelemetryError> telemetry_error_;
-  PageFaults page_faults_;                       // real-time thread, at its end
+  PageFaults page_faults_;               // real-time thread, at its end
   PageFaults faults_at_start_;           // real-time thread, before it sets realtime_thread_
   std::atomic<int> realtime_thread_{0};  // its id; 0: not running
   std::vector<std::thread> threads_;

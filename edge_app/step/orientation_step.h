@@ -94,7 +94,7 @@ struct StepEvents {
   // From this frame on the sender's time stamps are left out, because they run at another rate than
   // the pictures come: their rate less one.
   std::optional<double> stamps_left_out;
-  bool stamps_count = false;  // those stamps count pictures
+  bool stamps_count = false;                  // those stamps count pictures
   std::optional<LinkDelayReport> link_delay;  // empty: without a calibration
   bool link_delay_told = false;               // from this frame on, by motion
 };

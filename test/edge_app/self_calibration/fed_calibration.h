@@ -90,6 +90,7 @@ struct Feed {
   double poll_s = 0;  // so long before its stamp a sample was asked for; 0: it came by itself
   bool delay_steps = false;  // with the first frame the least delay of the video is another one
   double delay_wander_s = 0;
+  std::function<double(double)> wander_at = {};  // in place of it, by the time
   std::function<void()> before_adjusting = {};
   // A machine with too much to do takes up this share of the frames, and stamps them late, by so much in the mean, but for
   // the sender's clock.
@@ -149,7 +150,7 @@ inline std::vector<Published> feed(SelfCalibration* calibration, const Simulatio
     tracks.tracker = how.tracker;
     tracks.clock_restarted = tracks.stamp.restarted = how.restarts && frame.frame == 0;
     tracks.delay_stepped = how.delay_steps && frame.frame == 0;
-    tracks.delay_wander_s = how.delay_wander_s;
+    tracks.delay_wander_s = how.wander_at ? how.wander_at(frame.stamp_s) : how.delay_wander_s;
     tracks.oe_status =
         frame.stamp_s >= how.contradicting_from_s ? OeStatus::kContradiction : OeStatus::kOk;
     const auto taken = [&how](std::int64_t number) {
