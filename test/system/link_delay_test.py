@@ -1,21 +1,26 @@
 #!/usr/bin/env python3
 """`alidade run` with a stored calibration on a link whose delay is another one than when the camera was calibrated: the first
-movement tells the delay, log and /api/v1/status say it, and no record is wrong beyond what its sigma claims."""
+movement tells the delay, log and /api/v1/status say it, and no record is wrong beyond what its sigma claims. And a first calibration
+behind a relay whose delay jitters."""
 import bisect
 import json
 import math
 import signal
 import unittest
+import urllib.parse
 import urllib.request
 
 import yaml
 
+from delay_proxy import DelayProxy
 from harness import DEADLINE_S, SystemTest, Truth, wait_until
+from self_calibration import Watch, stored_calibration
 
 WIDTH, HEIGHT, RATE_HZ = 320, 240, 25
 FOCAL_LENGTH_PX = 5334.65
 CLOCK_OFFSET_MS = -84.4
 FOUND_WITHIN_S = 2  # of the first record with an orientation: the camera moves all the time
+RELAY_S = 40  # of a first calibration and what comes after it
 MOST_BEYOND = 1e-4  # share of the records beyond 5 sigma
 SETTINGS = {
     "image": {"width": WIDTH, "height": HEIGHT, "rate_hz": RATE_HZ},
@@ -114,6 +119,39 @@ class LinkDelaySeeds(LinkDelayTest):
         print(f"{beyond} of {count} records beyond 5 sigma; the worst error in sigmas: "
               + ", ".join(f"{ms:+d} ms {mode} {error:.1f}" for (ms, mode), error in worst.items()))
         self.assertLessEqual(beyond, max(1, MOST_BEYOND * count))
+
+
+class RelaySeeds(LinkDelayTest):
+    def test_a_first_calibration_behind_a_relay_that_delays_by_up_to_80_ms(self):
+        beyond = count = 0
+        for seed in range(1, 11):
+            with self.subTest(seed=seed):
+                camera = self.camera(seed=seed, settings=SETTINGS)
+                url = urllib.parse.urlsplit(camera.video_url)
+                relay = DelayProxy((url.hostname, url.port), 0.08, seed)
+                self.addCleanup(relay.close)
+                file = self.folder / f"live-{seed}" / "calibration.yaml"
+                config = self.write_config(
+                    camera, video={"url": url._replace(netloc=f"127.0.0.1:{relay.port}").geturl(), "width": WIDTH, "height": HEIGHT},
+                    focal_length_px=1.15 * FOCAL_LENGTH_PX, calibration={"file": str(file), "auto": True}, realtime={"mode": "OE"})
+                watch = Watch(self.alidade("run", "-c", config))
+                watch.next()
+                while watch.since_first_frame(watch.records[-1]) < RELAY_S:
+                    self.assertIsNotNone(watch.next(), watch.process.error_text())
+                code, _ = watch.process.end(signal.SIGINT)
+                self.assertEqual(code, 0, watch.process.error_text())
+                told = [r for r in watch.records if r["calibrated"] and r["q_base_from_camera"] is not None]
+                self.assertTrue(told, f"never calibrated\n{watch.process.error_text()}")
+                errors = self.errors(camera, told)
+                camera.end(signal.SIGINT)
+                count += len(errors)
+                beyond += sum(error > 5 for error in errors)
+                focal_length = yaml.safe_load(stored_calibration(file).read_text(encoding="utf-8"))["focal_length"]
+                error = (focal_length["value"] - FOCAL_LENGTH_PX) / focal_length["sigma"]
+                print(f"seed {seed}: focal length off by {error:+.1f} sigma; {sum(error > 5 for error in errors)} of {len(errors)} records "
+                      f"beyond 5 sigma, the worst at {max(errors):.1f}; OE in {sum(r['mode'] == 'OE' for r in told)}")
+                self.assertLess(abs(error), 3)
+        self.assertLessEqual(beyond, max(1, MOST_BEYOND * count), f"of {count} records")
 
 
 if __name__ == "__main__":
