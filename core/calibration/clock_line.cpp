@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <utility>
 
 #include "core/model/lower_line.h"
 #include "core/model/median.h"
@@ -68,6 +69,24 @@ double white_noise(const std::vector<double>& stamp) {
     second_differences.push_back(std::abs(stamp[i] - 2 * stamp[i - 1] + stamp[i - 2]));
   }
   return 1.4826 * median(second_differences) / std::sqrt(6.0);
+}
+
+// Delays above the least one as lower_line.h wants them: their density near it is 1 / scale. That
+// is their mean if they are exponential. If far fewer come near it, beyond chance, as behind a relay
+// that delays evenly and keeps the order, the nearest tell.
+double delay_scale(std::vector<double> above, double mean) {
+  constexpr std::size_t kLeastNear = 6;
+  constexpr double kMostNear = 0.2;      // of the delays
+  constexpr double kBeyondChance = 2.5;  // standard deviations
+  std::sort(above.begin(), above.end());
+  const auto all = static_cast<double>(above.size());
+  double scale = mean;
+  for (std::size_t near = kLeastNear; static_cast<double>(near) <= kMostNear * all; near *= 2) {
+    const auto count = static_cast<double>(near);
+    const double told = above[near - 1] * all / count;
+    if (told > mean * (1 + kBeyondChance / std::sqrt(count))) scale = std::max(scale, told);
+  }
+  return scale;
 }
 
 // Counts ticks along the stamps, predicting each from those before. Gaps become whole periods.
@@ -150,11 +169,16 @@ ClockLine fit_clock_line(const ClockInput& input) {
                                   ? 4 * *input.period_sigma_s + 6 * sigma / std::sqrt(line.spread)
                                   : 20 * sigma / std::sqrt(line.spread);
     std::vector<std::uint16_t> hull(count);
-    // Exponential delays have their mean above the least delay as scale.
-    const LineEstimate lower =
-        fit_lower_line(n.data(), input.stamp_s.data(), std::min<std::size_t>(count, 65535),
-                       std::max(-lowest, 1e-9), line.period - half_range, line.period + half_range,
-                       line.middle, hull.data());
+    const auto fit = [&](double scale, double range) {
+      return fit_lower_line(n.data(), input.stamp_s.data(), std::min<std::size_t>(count, 65535),
+                            scale, line.period - range, line.period + range, line.middle,
+                            hull.data());
+    };
+    const double mean = std::max(-lowest, 1e-9);
+    LineEstimate lower = fit(mean, half_range);
+    for (std::size_t i = 0; i < count; ++i) late[i] = input.stamp_s[i] - lower.value_at(n[i]);
+    const double scale = delay_scale(std::move(late), mean);
+    if (scale > mean) lower = fit(scale, half_range * scale / mean);
     line.offset = lower.value;
     line.period = lower.slope;
     result.offset_sigma_s = std::sqrt(lower.var_value);

@@ -4,7 +4,8 @@
 // Symmetric noise: least squares without outliers beyond 5 robust sigmas, joined with the known
 // period if there is one. Offset and period are then uncorrelated. one_sided: the highest line
 // below the stamps (core/model/lower_line.h); its constant least delay becomes part of the clock
-// offset.
+// offset. How sure it is depends on how many delays come near the least one, as measured: behind a
+// relay that delays evenly they are few.
 // n_i are sequence numbers or, without them, counted along the stamps with gaps. Stamps that fit no
 // steady clock, or have none (a polled device), stay as they are. Allocates.
 

@@ -67,7 +67,8 @@ Play read_play(const EstimateReader& file, const std::string& name) {
   }
   const std::string prefix = name + ".";
   file.check_keys(entry, {"value", "sigma", "kind"}, prefix);
-  play.width_rad = file.value(entry, name, {0, kWidest_rad, "radians; 0.1 degrees are 1.7e-3"});
+  play.width_rad =
+      file.value(entry, name, {0, kWidest_rad, "radians, 0 or more; 0.1 degrees are 1.7e-3"});
   play.sigma_rad = not_negative(file, entry, "sigma", prefix);
   const YAML::Node kind = file.required(entry, "kind", prefix);
   const std::string text = kind.IsScalar() ? kind.Scalar() : "";

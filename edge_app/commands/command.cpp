@@ -4,6 +4,7 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <filesystem>
@@ -125,7 +126,30 @@ Calibration data_sheet_calibration(const CameraConfig& camera) {
   return calibration;
 }
 
+namespace {
+
+// Readings that change by steps cannot show what repeats within one of them.
+void require_coarser_than_steps(const char* name, const AngleErrorCurve& curve, double step_rad,
+                                const std::string& file) {
+  if (curve.count < 2) return;
+  const double shortest_rad = std::max(2 * curve.spacing_rad, 2 * kPi * curve.length_rad);
+  if (shortest_rad >= step_rad) return;
+  throw CommandError(
+      kExitUsage,
+      fmt::format("{}: {} has a period of {:.3g} rad, shorter than the steps of "
+                  "pan_tilt.angle_quantum_rad ({:.3g} rad), which cannot show it; remove {}, or "
+                  "state the head's true steps",
+                  file, name, shortest_rad, step_rad, name));
+}
+
+}  // namespace
+
 OrientationStepOptions step_options(const Config& config, const PublishedCalibration& calibration) {
+  const double step_rad = config.pan_tilt.angle_quantum_rad;
+  require_coarser_than_steps("pan_error", calibration.telemetry_error.pan, step_rad,
+                             calibration.name);
+  require_coarser_than_steps("tilt_error", calibration.telemetry_error.tilt, step_rad,
+                             calibration.name);
   OrientationStepOptions options = step_options(RecordingNoise{}, calibration);
   options.wait_for_pace = options.other_connection =
       config.video.type != VideoConfig::Type::kRecording;

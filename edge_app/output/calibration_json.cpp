@@ -1,7 +1,9 @@
 #include "edge_app/output/calibration_json.h"
 
+#include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <utility>
 #include <vector>
 
 #include "core/calibration/calibration_text.h"
@@ -56,6 +58,47 @@ ordered_json calibration_json(const Calibration& calibration) {
     matrix.push_back(std::move(values));
   }
   json["covariance"] = {{"names", std::move(names)}, {"matrix", std::move(matrix)}};
+  return json;
+}
+
+ordered_json telemetry_error_json(const TelemetryError& error) {
+  constexpr int kSamples = 241;
+  ordered_json json = ordered_json::object();
+  const auto add_curve = [&json](const char* name, const AngleErrorCurve& curve) {
+    if (!curve.exists()) return;
+    ordered_json& out = json[name];
+    if (curve.count > 0) {
+      out["knots_rad"] = {{"first", curve.first_rad}, {"spacing", curve.spacing_rad}};
+      ordered_json samples{{"angle_rad", ordered_json::array()},
+                           {"error_rad", ordered_json::array()},
+                           {"sigma_rad", ordered_json::array()}};
+      const int count = curve.count > 1 ? kSamples : 1;
+      for (int i = 0; i < count; ++i) {
+        const double angle = curve.first_rad + curve.extent_rad() * i / (kSamples - 1);
+        samples["angle_rad"].push_back(angle);
+        samples["error_rad"].push_back(curve.at(angle));
+        samples["sigma_rad"].push_back(curve.sigma(angle));
+      }
+      const auto first = [&curve](const std::array<double, AngleErrorCurve::kMaxKnots>& all) {
+        return std::vector<double>(all.begin(), all.begin() + curve.count);
+      };
+      out["values_rad"] = first(curve.values);
+      out["sigma_rad"] = first(curve.sigmas);
+      out["samples"] = std::move(samples);
+    }
+    out["length_rad"] = curve.length_rad;
+    out["unseen_sigma_rad"] = curve.unseen_sigma_rad;
+  };
+  const auto add_play = [&json](const char* name, const Play& play) {
+    if (!play.exists()) return;
+    json[name] = {{"value", play.width_rad},
+                  {"sigma", play.sigma_rad},
+                  {"kind", play.kind == PlayKind::kMotor ? "motor" : "output"}};
+  };
+  add_curve("pan_error", error.pan);
+  add_curve("tilt_error", error.tilt);
+  add_play("pan_play_rad", error.pan_play);
+  add_play("tilt_play_rad", error.tilt_play);
   return json;
 }
 

@@ -115,6 +115,7 @@ std::string calibration_report(const CalibrationReportInput& report) {
   report::correlations(page);
   report::residuals(page);
   report::trajectory(page);
+  report::telemetry_error(page);
   report::timing(page);
   report::landmarks(page);
   return html_page("Calibration of " + escape_html(report.name), page.body());

@@ -108,6 +108,9 @@ std::string summary_text(const CalibrationResult& result, const CalibrationOptio
         "image errors repeat from frame to frame: {:.1f} observations of a landmark count as one\n",
         quality.repetition);
   }
+  for (const std::string& line : telemetry_error_lines(result.telemetry_error)) {
+    text += "telemetry is off, " + line + "\n";
+  }
   for (const std::string& line : result.exclusions.describe()) text += "left out: " + line + "\n";
   text +=
       fmt::format("weakest: {} (condition {:.3g})\n", quality.weakest_direction, quality.condition);
@@ -118,6 +121,40 @@ std::string summary_text(const CalibrationResult& result, const CalibrationOptio
   return text;
 }
 
+std::vector<std::string> telemetry_error_lines(const TelemetryError& error) {
+  constexpr double kMilli = 1e3;
+  const auto line = [](const char* axis, const AngleErrorCurve& curve, const Play& play) {
+    std::string text;
+    if (curve.count > 0) {
+      double square = 0;
+      double known = 0;
+      for (std::size_t i = 0; i < static_cast<std::size_t>(curve.count); ++i) {
+        square += curve.values[i] * curve.values[i];
+        known += curve.sigmas[i] * curve.sigmas[i];
+      }
+      text = fmt::format(
+          "{:.3f} mrad (RMS) over {:.1f} degrees, known to {:.3f}; elsewhere {:.3f} of it is "
+          "possible",
+          kMilli * std::sqrt(square / curve.count), curve.extent_rad() * 180 / kPi,
+          kMilli * std::sqrt(known / curve.count), kMilli * curve.unseen_sigma_rad);
+    } else if (curve.exists()) {
+      text = fmt::format("up to {:.3f} mrad (one sigma), of unknown course",
+                         kMilli * curve.unseen_sigma_rad);
+    }
+    if (play.exists()) {
+      text +=
+          fmt::format("{}play of {:.3f} +- {:.3f} mrad, the encoder {}", text.empty() ? "" : "; ",
+                      kMilli * play.width_rad, kMilli * play.sigma_rad,
+                      play.kind == PlayKind::kMotor ? "on the motor" : "behind the gear");
+    }
+    return text.empty() ? text : std::string(axis) + ": " + text;
+  };
+  std::vector<std::string> lines = {line("pan", error.pan, error.pan_play),
+                                    line("tilt", error.tilt, error.tilt_play)};
+  lines.erase(std::remove(lines.begin(), lines.end(), std::string()), lines.end());
+  return lines;
+}
+
 std::string summary_json(const CalibrationResult& result, const CalibrationOptions& options,
                          const std::vector<std::pair<std::string, std::string>>& files) {
   using nlohmann::ordered_json;
@@ -125,6 +162,7 @@ std::string summary_json(const CalibrationResult& result, const CalibrationOptio
   json["status"] = to_string(result.status);
   json["message"] = result.message;
   json["calibration"] = parameters_json(result.calibration);
+  json["calibration"].update(telemetry_error_json(result.telemetry_error));
   for (const auto& [name, prior] : stated_priors(options)) {
     json["priors"][name] = {{"value", prior.value}, {"sigma", prior.sigma}};
   }

@@ -27,6 +27,9 @@ std::vector<SummaryRow> summary_rows(const CalibrationResult& result,
 // line feed.
 std::string summary_text(const CalibrationResult& result, const CalibrationOptions& options);
 
+// What the telemetry's angles are off by, a line for each axis; none if nothing is.
+std::vector<std::string> telemetry_error_lines(const TelemetryError& error);
+
 // One line. files: kind and path of each file that was written.
 std::string summary_json(const CalibrationResult& result, const CalibrationOptions& options,
                          const std::vector<std::pair<std::string, std::string>>& files);

@@ -76,6 +76,9 @@ ServerResponse calibration(const HttpApiSources& sources) {
     return http_error(404, "there is no calibration for this camera at this zoom yet");
   Json json = calibration_json(unpack(newest->camera));
   if (const auto curve = zoom_curve_of(sources)) json["zoom_curve"] = zoom_curve_json(*curve);
+  if (const auto error = sources.telemetry_error ? sources.telemetry_error() : nullptr) {
+    json.update(telemetry_error_json(*error));
+  }
   return json_response(json);
 }
 

@@ -28,6 +28,8 @@ struct HttpApiSources {
   std::function<bool()> ask_for_calibration;
   // The zoom curve in use; returns null if there is none. May be an empty function.
   std::function<std::shared_ptr<const ZoomCurve>()> zoom_curve;
+  // What the telemetry is off by, as it is corrected; may be null or an empty function.
+  std::function<std::shared_ptr<const TelemetryError>()> telemetry_error;
   std::shared_ptr<const PlaneEstimate> plane;  // null: none is configured
   // Fits the ground plane. body and *answer are JSON; false with one line in *error.
   std::function<bool(const std::string& body, std::string* answer, std::string* error)> fit_plane;

@@ -86,6 +86,8 @@ void residuals(ReportPage& page);
 void trajectory(ReportPage& page);
 void timing(ReportPage& page);
 void landmarks(ReportPage& page);
+// In report_telemetry.cpp. Nothing if telemetry was found exact but for noise.
+void telemetry_error(ReportPage& page);
 
 // A symmetric range that shows `quantile` of the magnitudes, with a margin.
 inline double symmetric_range(std::vector<double> magnitudes, double quantile) {

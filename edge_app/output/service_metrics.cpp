@@ -202,6 +202,19 @@ void add_target_metrics(const TargetFeed& feed, MetricsText* out) {
   out->add(counters.births_refused);
 }
 
+void add_link_delay_metrics(const PipelineSummary& summary, double now_s, MetricsText* out) {
+  out->gauge("alidade_link_delay_seconds",
+             "By how much telemetry comes later against the pictures than when the camera was "
+             "calibrated");
+  out->add(summary.link_delay->delay_s);
+  out->gauge("alidade_link_delay_sigma_seconds", "Its standard deviation");
+  out->add(summary.link_delay->sigma_s);
+  out->gauge("alidade_link_delay_age_seconds", "Since it was told, or began to be open");
+  out->add(now_s - summary.link_delay_since_s);
+  out->gauge("alidade_link_delay_open", "1: no movement has told it yet");
+  out->add(std::int64_t{summary.link_delay->state == LinkDelayState::kOpen});
+}
+
 void add_detector_metrics(const DetectorsReport& report, MetricsText* out) {
   out->counter("alidade_detector_pictures_replaced_total",
                "Pictures that no detector looked at, as a newer one came");
@@ -292,6 +305,7 @@ std::string service_metrics(const HttpApiSources& sources, const HttpCounters& h
   out.gauge("alidade_video_clock_wander_seconds",
             "By how much time stamps and arrivals wander against each other");
   out.add(summary.delay_wander_s);
+  if (summary.link_delay) add_link_delay_metrics(summary, now_s, &out);
   out.gauge("alidade_video_stamps_left_out", "1: they run at another rate than the pictures come");
   out.add(std::int64_t{summary.stamps_left_out.has_value()});
   out.counter("alidade_realtime_page_faults_total",

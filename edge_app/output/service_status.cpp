@@ -31,6 +31,14 @@ Json link_json(const LinkHealth& link) {
           {"rate_hz", or_null(link.rate_hz)}};
 }
 
+Json link_delay_json(const PipelineSummary& summary, double now_s) {
+  if (!summary.link_delay) return nullptr;
+  return {{"state", to_string(summary.link_delay->state)},
+          {"delay_s", summary.link_delay->delay_s},
+          {"sigma_s", summary.link_delay->sigma_s},
+          {"age_s", now_s - summary.link_delay_since_s}};
+}
+
 Json detectors_json(const DetectorsReport& report) {
   Json out{{"replaced", report.replaced}};
   for (const DetectorKindRow& row : kDetectorKinds) {
@@ -101,6 +109,7 @@ nlohmann::ordered_json service_status(const HttpApiSources& sources, const HttpC
                         {"floor_shifts", summary.delay_steps},
                         {"wander_s", summary.delay_wander_s},
                         {"left_out_rate_error", or_null(summary.stamps_left_out)}};
+  out["link_delay"] = link_delay_json(summary, now_s);
   out["latency_s"] = sources.latency_measured ? quantiles(summary.latency) : Json();
   if (sources.latency_measured) {
     out["stages_s"] = {{"decoding", quantiles(summary.decoding)},

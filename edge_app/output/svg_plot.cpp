@@ -122,6 +122,18 @@ void SvgPlot::line(const std::vector<PlotPoint>& points, const char* colour) {
   body_ += fmt::format("<path class=\"line {}\" d=\"{}\"/>\n", colour, path);
 }
 
+void SvgPlot::area(const std::vector<PlotPoint>& low, const std::vector<PlotPoint>& high,
+                   const char* colour) {
+  if (low.empty() || high.empty()) return;
+  std::string path;
+  const auto add = [&](const PlotPoint& point) {
+    path += fmt::format("{}{:.1f} {:.1f}", path.empty() ? 'M' : 'L', px(point.x), py(point.y));
+  };
+  for (const PlotPoint& point : low) add(point);
+  std::for_each(high.rbegin(), high.rend(), add);
+  body_ += fmt::format("<path class=\"area {}\" fill-opacity=\".2\" d=\"{}Z\"/>\n", colour, path);
+}
+
 void SvgPlot::arrow(const PlotPoint& from, const PlotPoint& to) {
   body_ += fmt::format(
       "<path class=\"line ink\" d=\"M{0:.1f} {1:.1f}L{2:.1f} {3:.1f}\"/>"

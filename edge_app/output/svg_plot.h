@@ -32,6 +32,9 @@ class SvgPlot {
 
   void dots(const std::vector<PlotPoint>& points, const char* colour, double diameter = 2.2);
   void line(const std::vector<PlotPoint>& points, const char* colour);
+  // Between two lines; the line is drawn over it separately.
+  void area(const std::vector<PlotPoint>& low, const std::vector<PlotPoint>& high,
+            const char* colour);
   void arrow(const PlotPoint& from, const PlotPoint& to);
   // A grey band from `low` to `high` over the whole width.
   void band(double low, double high);

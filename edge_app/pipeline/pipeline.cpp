@@ -41,7 +41,8 @@ Pipeline::Pipeline(FrameSource& video, PanTiltSource& pan_tilt, RecordSink& sink
       way_processor_(processor_of_the_way(options)),
       log_(video, pan_tilt, options.step),
       finished_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
-      zoom_curve_(std::make_shared<const ZoomCurve>(options.step.zoom_curve)) {
+      zoom_curve_(std::make_shared<const ZoomCurve>(options.step.zoom_curve)),
+      telemetry_error_(std::make_shared<const TelemetryError>(options.step.telemetry_error)) {
   if (finished_ < 0) throw std::system_error(errno, std::generic_category(), "eventfd");
   summary_.reasons = ReasonCounts(options.step.oe.has_value());
   for (ImageSlot slot = 0; slot < kImageSlots; ++slot) free_slots_.push_back(slot);
@@ -281,6 +282,7 @@ void Pipeline::calibrate() {
       {
         const std::lock_guard<PriorityMutex> lock(summary_mutex_);
         zoom_curve_ = {published, &published->zoom_curve};
+        telemetry_error_ = {published, &published->telemetry_error};
       }
       if (stage_.publish(published.get())) lent.push_back(std::move(published));
     }
@@ -342,6 +344,11 @@ std::shared_ptr<const ZoomCurve> Pipeline::zoom_curve() const {
   return zoom_curve_;
 }
 
+std::shared_ptr<const TelemetryError> Pipeline::telemetry_error() const {
+  const std::lock_guard<PriorityMutex> lock(summary_mutex_);
+  return telemetry_error_;
+}
+
 void Pipeline::count(const OutputMessage& message) {
   const std::lock_guard<PriorityMutex> lock(summary_mutex_);
   ++summary_.records;
@@ -354,7 +361,15 @@ void Pipeline::count(const OutputMessage& message) {
     summary_.latency.add(*message.record.latency_s);
   if (message.events.video_clock_restarted) ++summary_.clock_restarts;
   if (message.events.video_delay_stepped) ++summary_.delay_steps;
-  if (message.record.frame) summary_.delay_wander_s = message.events.video_delay_wander_s;
+  if (message.record.frame) {
+    summary_.delay_wander_s = message.events.video_delay_wander_s;
+    const auto& delay = message.events.link_delay;
+    const bool goes_on = delay && summary_.link_delay &&
+                         delay->state == summary_.link_delay->state &&
+                         !message.events.link_delay_told;
+    if (!goes_on) summary_.link_delay_since_s = monotonic_now_s();
+    summary_.link_delay = delay;
+  }
   if (message.events.stamps_left_out) summary_.stamps_left_out = message.events.stamps_left_out;
 }
 

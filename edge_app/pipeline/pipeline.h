@@ -13,7 +13,7 @@
 // A source that loses its connection is waited for. Records of mode `none` are made at the loss and
 // then each second. The pipeline is finished when the video has ended, a source has failed for
 // good, or the sink takes no more. stop() ends it at any time. One thread owns the pipeline and
-// calls everything here, except summary() and zoom_curve().
+// calls everything here, except summary(), zoom_curve() and telemetry_error().
 
 #include <atomic>
 #include <cstdint>
@@ -57,6 +57,9 @@ struct PipelineSummary {
   double delay_wander_s = 0;  // s, of the video, as of the last frame; 0: it does not wander
   // The rate of the sender's time stamps, less one, if they are left out because of it.
   std::optional<double> stamps_left_out;
+  // As of the last frame, and the host's time since which it is so; empty: no calibration.
+  std::optional<LinkDelayReport> link_delay;
+  double link_delay_since_s = 0;
   std::int64_t records = 0;
   std::int64_t frames = 0;
   std::int64_t with_orientation = 0;
@@ -105,6 +108,8 @@ class Pipeline {
   [[nodiscard]] PipelineSummary summary() const;
   // Any thread, at any time: the zoom curve in use; may be empty.
   [[nodiscard]] std::shared_ptr<const ZoomCurve> zoom_curve() const;
+  // Likewise: what the telemetry is corrected by.
+  [[nodiscard]] std::shared_ptr<const TelemetryError> telemetry_error() const;
 
  private:
   void capture();
@@ -142,8 +147,10 @@ class Pipeline {
   std::string error_;                    // of the first thread that failed
   mutable PriorityMutex summary_mutex_;  // never taken by the running real-time thread
   PipelineSummary summary_;
-  std::shared_ptr<const ZoomCurve> zoom_curve_;  // guarded by summary_mutex_
-  PageFaults page_faults_;                       // real-time thread, at its end
+  // Guarded by summary_mutex_.
+  std::shared_ptr<const ZoomCurve> zoom_curve_;
+  std::shared_ptr<const TelemetryError> telemetry_error_;
+  PageFaults page_faults_;               // real-time thread, at its end
   PageFaults faults_at_start_;           // real-time thread, before it sets realtime_thread_
   std::atomic<int> realtime_thread_{0};  // its id; 0: not running
   std::vector<std::thread> threads_;

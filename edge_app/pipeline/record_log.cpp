@@ -80,9 +80,9 @@ void RecordLog::log_clock(const OutputMessage& message) {
 
 void RecordLog::log_delay(const OutputMessage& message) {
   const StepEvents& events = message.events;
-  if (!events.link_delay_s) return;
-  const double delay_ms = 1e3 * *events.link_delay_s;
-  const double sigma_ms = 1e3 * events.link_delay_sigma_s;
+  if (!events.link_delay_told || !events.link_delay) return;
+  const double delay_ms = 1e3 * events.link_delay->delay_s;
+  const double sigma_ms = 1e3 * events.link_delay->sigma_s;
   constexpr double kAlike = 3;     // standard deviations
   constexpr double kAlike_ms = 5;  // by which connections differ anyway
   if (std::abs(delay_ms) < std::max(kAlike_ms, kAlike * sigma_ms)) {

@@ -49,6 +49,8 @@ const char* to_string(CalibrationNeed need) {
       return "telemetry that describes the motion in the video";
     case CalibrationNeed::kPictures:
       return "more of the pictures: the machine is too slow or too busy";
+    case CalibrationNeed::kFreshPictures:
+      return "pictures that are not repeated";
     case CalibrationNeed::kTime:
       return "more of the same motion";
     case CalibrationNeed::kSteadyZoom:

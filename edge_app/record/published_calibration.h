@@ -51,6 +51,7 @@ enum class CalibrationNeed : std::uint8_t {
   kTexture,        // scene too plain: too few landmarks
   kAgreement,      // telemetry does not describe the motion in the video
   kPictures,       // most pictures never come here: the machine has too much to do
+  kFreshPictures,  // pictures are sent again while the camera turns
   kTime,           // more of the same motion
   kSteadyZoom,     // the zoom is moving
   kSteadyDelay,    // the video's delay wanders

@@ -2,10 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+
 namespace alidade {
 namespace {
 
 constexpr double kFewPictures = 0.5;  // of those that the camera took
+constexpr double kRepeats = 0.01;     // of the pictures; more than a slip, as `check` has it
 
 CalibrationNeed need_of(const CheckedCalibration& checked) {
   const CalibrationResult& result = checked.result;
@@ -47,10 +50,26 @@ bool pictures_would_help(const CalibrationResult& result) {
   }
 }
 
+// Whether wrong times of the pictures may be what was found wrong.
+bool repeats_matter(const CalibrationResult& result) {
+  return pictures_would_help(result) && result.status != CalibrationStatus::kWeak;
+}
+
 }  // namespace
 
-CalibrationRefusal why_refused(const CheckedCalibration& checked, std::size_t frames) {
+CalibrationRefusal why_refused(const CheckedCalibration& checked, std::size_t frames,
+                               double repeated_share) {
   const CalibrationResult& result = checked.result;
+  if (repeated_share > kRepeats && repeats_matter(result)) {
+    // In tens of percent, so that the same line is not said again and again.
+    const double tens = std::ceil(10 * repeated_share) * 10;
+    return {CalibrationNeed::kFreshPictures,
+            fmt::format(": pictures are repeated: up to {:.0f} % of them are the one before, sent "
+                        "again while the camera turned, so that nobody knows when the others were "
+                        "taken; set the camera, its night mode, the converter or the grabber to "
+                        "the rate at which it takes pictures (`alidade check` says which)",
+                        tens)};
+  }
   const std::string why = fmt::format(" ({}): {}", to_string(result.status), checked.refusal);
   const double taken_up = share_taken_up(result, frames);
   if (taken_up >= kFewPictures || !pictures_would_help(result)) return {need_of(checked), why};

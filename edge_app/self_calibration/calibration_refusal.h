@@ -1,7 +1,8 @@
 #pragma once
-// Why a session gave no calibration, and what would help. If most pictures were never looked at, as
-// on an overloaded machine, the reason says so. A mismatch between telemetry and motion is then not
-// reported, as too few pictures were seen to judge it. Pure; allocates.
+// Why a session gave no calibration, and what would help. If pictures were sent again while the
+// camera turned, nobody knows when the others were taken; if most pictures were never looked at, as
+// on an overloaded machine, too few were seen. The reason says so, and a mismatch between telemetry
+// and motion, which follows from it, is not reported. Pure; allocates.
 
 #include <cstddef>
 #include <string>
@@ -16,7 +17,9 @@ struct CalibrationRefusal {
   std::string why;  // begins with " (" or ": ", to follow "not calibrated yet"
 };
 
-// checked: must have a refusal. frames: the number of frames in its session.
-[[nodiscard]] CalibrationRefusal why_refused(const CheckedCalibration& checked, std::size_t frames);
+// checked: must have a refusal. frames: the number of frames in its session. repeated_share: of the
+// pictures that came, those that were the one before.
+[[nodiscard]] CalibrationRefusal why_refused(const CheckedCalibration& checked, std::size_t frames,
+                                             double repeated_share);
 
 }  // namespace alidade

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <deque>
+#include <optional>
 #include <utility>
 
 namespace alidade {
@@ -25,16 +26,23 @@ class ContradictionJudge {
   explicit ContradictionJudge(const ContradictionOptions& options = {}) : options_(options) {}
 
   Verdict judge(double chi_square) {
+    chi_square_ = chi_square;
     if (!(chi_square > options_.least_chi_square)) {
       in_a_row_ = 0;
       return Verdict::kAgrees;
     }
     return ++in_a_row_ >= options_.believed_after ? Verdict::kBelieved : Verdict::kContradicts;
   }
+  // The chi-square of the last one, if it contradicted and was not believed yet.
+  [[nodiscard]] std::optional<double> pending() const {
+    return in_a_row_ > 0 && in_a_row_ < options_.believed_after ? std::optional(chi_square_)
+                                                                : std::nullopt;
+  }
   void restart() { in_a_row_ = 0; }
 
  private:
   ContradictionOptions options_;
+  double chi_square_ = 0;
   int in_a_row_ = 0;
 };
 

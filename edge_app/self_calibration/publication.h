@@ -28,6 +28,8 @@ class Publication {
     is_withdrawn_ = false;
     is_fresh_wanted_ = false;
   }
+  // The present one with other sigmas.
+  void widen(Object by) { present_ = next_ = std::move(by); }
   // The present one is no longer believed. by: what replaces it, not calibrated. The stored one of
   // its zoom is rejected.
   void withdraw(Object by) {

@@ -91,11 +91,29 @@ bool SelfCalibration::judge_delay(const FrameTracks& tracks) {
                           "they hold; the camera itself would be better read directly",
                           1e3 * tracks.delay_wander_s)
             : "the video's delay holds again; the clock offset is found anew");
+    if (streams_.delay_wanders()) widen_contradicted();
     begin_anew();
     publication_.clock_began_anew();
     clock_began_anew();
   }
   return streams_.delay_wanders();
+}
+
+// While the delay wanders nothing better can be had. So the sigmas grow to what the last motion has
+// shown, as a second contradiction cannot come.
+void SelfCalibration::widen_contradicted() {
+  const std::optional<double> chi_square = contradiction_.pending();
+  if (!chi_square || !is_calibrated_here()) return;
+  contradiction_.restart();
+  const auto parameters = static_cast<double>(kComparedParameters.size());
+  auto widened = std::make_shared<PublishedCalibration>(*publication_.object());
+  widened->calibration.covariance *= *chi_square / parameters;
+  widened->name += ", widened";
+  messages_.say(fmt::format(
+      "the last motion contradicted the calibration (chi-square {:.0f}), and while the delay "
+      "wanders none can take its place: its sigmas are now {:.1f} times as wide",
+      *chi_square, std::sqrt(*chi_square / parameters)));
+  publication_.widen(widened);
 }
 
 void SelfCalibration::judge_agreement(const FrameTracks& tracks) {
@@ -211,7 +229,8 @@ void SelfCalibration::try_first() {
   }
   // The program ends: nobody need do anything about it.
   if (checked.result.status == CalibrationStatus::kCancelled) return;
-  const CalibrationRefusal refusal = why_refused(checked, session_.frames());
+  const CalibrationRefusal refusal =
+      why_refused(checked, session_.frames(), streams_.repeated_share());
   need_ = refusal.need;
   messages_.say_once(
       (publication_.is_fresh_wanted() ? "no fresh calibration yet" : "not calibrated yet") +

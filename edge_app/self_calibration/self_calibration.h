@@ -5,7 +5,7 @@
 // more than the last try, and publishes the result, with its map, if it passes the checks; tests it
 // against later motion, refines it or withdraws it. Each zoom has its own calibration; those of
 // several zooms become nodes of a zoom curve. While the video's delay wanders, nothing is
-// calibrated or withdrawn.
+// calibrated or withdrawn; what was just contradicted is widened.
 // Step by step: docs/derivations.md. Allocates; work() takes seconds. One thread.
 
 #include <atomic>
@@ -91,6 +91,7 @@ class SelfCalibration {
   void look_for_stored();
   // True: the delay wanders, and the frame cannot be used.
   bool judge_delay(const FrameTracks& tracks);
+  void widen_contradicted();
   void judge_agreement(const FrameTracks& tracks);
   [[nodiscard]] bool is_calibrated_here() const;
   [[nodiscard]] bool storing_is_due() const;

@@ -9,6 +9,13 @@ void StreamWatch::add(const FrameTracks& tracks) {
   now_s_ = std::max(now_s_, last_frame_s_);
   video_is_lost_ = false;
   telemetry_is_old_ = old_telemetry_.judge(now_s_, tracks.telemetry_too_old);
+  static_cast<void>(repeated_.judge(now_s_, tracks.image_repeated));
+}
+
+double StreamWatch::repeated_share() const {
+  if (repeated_.frames() < kRepeated.least_frames) return 0;
+  return static_cast<double>(repeated_.contradicted_frames()) /
+         static_cast<double>(repeated_.frames());
 }
 
 void StreamWatch::add(const PanTiltSample& sample) {

@@ -1,6 +1,7 @@
 #pragma once
 // StreamWatch: are frames and telemetry good enough to calibrate a camera with them? Neither may be
-// lost or silent; the video's delay must be steady, and telemetry young enough for the frames.
+// lost or silent; the video's delay must be steady, telemetry young enough for the frames, and
+// pictures may not be repeated.
 // Seconds of the host's clock. Allocates little. One thread.
 
 #include <optional>
@@ -26,6 +27,9 @@ class StreamWatch {
   [[nodiscard]] bool judge_delay(const FrameTracks& tracks);
   [[nodiscard]] bool delay_wanders() const { return delay_wanders_; }
 
+  // Of the latest frames, how many had a picture that was sent again.
+  [[nodiscard]] double repeated_share() const;
+
   // The latest receive time of either stream.
   [[nodiscard]] double now_s() const { return now_s_; }
   // What must become better before anything is calibrated or withdrawn; empty: nothing.
@@ -38,6 +42,10 @@ class StreamWatch {
   static constexpr DisagreementOptions kOldTelemetry = {/*span_s=*/2, /*share=*/0.5,
                                                         /*least_frames=*/5};
 
+  // Only the counts are used: as long as a session's frames.
+  static constexpr DisagreementOptions kRepeated = {/*span_s=*/40, /*share=*/1,
+                                                    /*least_frames=*/20};
+
   CalibrationSchedule schedule_;
   double now_s_ = 0;
   double last_frame_s_ = 0;
@@ -47,6 +55,7 @@ class StreamWatch {
   bool delay_wanders_ = false;
   DisagreementJudge old_telemetry_{kOldTelemetry};
   bool telemetry_is_old_ = false;
+  DisagreementJudge repeated_{kRepeated};
 };
 
 }  // namespace alidade

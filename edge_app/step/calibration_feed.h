@@ -39,6 +39,7 @@ struct FrameTracks {
   bool clock_restarted = false;    // the frame clock restarted with this frame
   bool delay_stepped = false;      // the least delay of the video, or the sender's clock, stepped
   double delay_wander_s = 0;       // s, by how much the video's delay wanders; 0: it does not
+  bool image_repeated = false;     // sent again while the camera turned
   bool telemetry_too_old = false;  // the frame lies beyond max_extrapolation_s
   OeStatus oe_status = OeStatus::kNoPrediction;  // set if tracker is kOe
   int count = 0;

@@ -177,6 +177,7 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
   tracks_.time_is_of_use = frame_time.of_use;
   tracks_.clock_restarted = clock.restarted;
   tracks_.delay_wander_s = frame_time.wander_s;
+  tracks_.image_repeated = false;
   tracks_.telemetry_too_old = false;
   tracks_.tracker = FrameTracks::Tracker::kNone;
 
@@ -206,6 +207,7 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
                              calibration.camera.focal_length)) {
     record.time_s.reset();
     record.status = RecordStatus::kImageRepeated;
+    tracks_.image_repeated = true;
     image_ = ImageView{};
     return record;
   }

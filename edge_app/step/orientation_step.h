@@ -76,6 +76,13 @@ struct OrientationStepOptions {
 // Throws std::invalid_argument if an option is not valid; its one line names the option.
 [[nodiscard]] std::unique_ptr<OeMode> make_oe_mode(const OeOptions& options);
 
+// How late telemetry comes against the images, compared with the calibration that is in use.
+struct LinkDelayReport {
+  LinkDelayState state = LinkDelayState::kCalibrated;
+  double delay_s = 0;  // s, added to the calibration's clock offset
+  double sigma_s = 0;
+};
+
 // What a frame brought to light, for the log.
 struct StepEvents {
   bool video_clock_restarted = false;
@@ -87,11 +94,9 @@ struct StepEvents {
   // Set in the frame from which the sender's time stamps are left out, as they run at another rate
   // than the pictures come: their rate less one.
   std::optional<double> stamps_left_out;
-  bool stamps_count = false;  // those stamps count pictures
-  // s, with one standard deviation. Set in the frame from which telemetry is looked up so much
-  // later than the calibration says, as motion has shown.
-  std::optional<double> link_delay_s;
-  double link_delay_sigma_s = 0;
+  bool stamps_count = false;                  // those stamps count pictures
+  std::optional<LinkDelayReport> link_delay;  // empty: without a calibration
+  bool link_delay_told = false;               // from this frame on, by motion
 };
 
 class OrientationStep {

@@ -180,10 +180,12 @@ void OrientationStep::follow_turn() {
 void OrientationStep::tell_delay(StepEvents* events) {
   const bool was_open = delay_was_open_;
   delay_was_open_ = link_delay_.state() == LinkDelayState::kOpen;
+  if (now_.calibrated) {
+    events->link_delay = {link_delay_.state(), link_delay_.delay_s(), link_delay_.sigma_s()};
+  }
   if (link_delay_.found() == delays_told_) return;
   delays_told_ = link_delay_.found();
-  events->link_delay_s = link_delay_.delay_s();
-  events->link_delay_sigma_s = link_delay_.sigma_s();
+  events->link_delay_told = now_.calibrated;
   // They would be looked up by the delay of before.
   if (oe_) oe_->forget_pending();
   if (!was_open) tracks_.delay_stepped = true;

@@ -121,6 +121,28 @@ class StatusPage(SystemTest):
             if not re.search(expected, entry["message"]):
                 self.assertNotIn(entry["level"], ("SEVERE", "WARNING"), entry["message"])
 
+    def shows_telemetry_error(self):
+        """Curve and loop as soon as a calibration has them, and not before."""
+        def shown(calibration):
+            return self.browser.execute_script("""
+                showTelemetryError(arguments[0]);
+                return ['angle-error', 'play'].map((id) => {
+                  const canvas = document.getElementById(`${id}-plot`);
+                  if (document.getElementById(id).hidden) return null;
+                  const {data} = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+                  return [document.getElementById(`${id}-caption`).textContent, data.some((value) => value > 0)];
+                });""", calibration)
+        self.assertEqual(shown({}), [None, None])
+        self.assertEqual(shown({"tilt_error": {"length_rad": 0, "unseen_sigma_rad": 1e-3}}), [None, None])
+        curve = {"length_rad": .1, "unseen_sigma_rad": 3e-4, "samples": {
+            "angle_rad": [-.1, 0, .1], "error_rad": [2e-4, -2e-4, 2e-4], "sigma_rad": [1e-5, 1e-5, 1e-5]}}
+        play = {"value": 5e-4, "sigma": 2e-5, "kind": "output"}
+        (error, drawn_error), (loop, drawn_loop) = shown({"pan_error": curve, "tilt_play_rad": play})
+        self.assertIn("pan 0.200 mrad, known to 0.010, elsewhere to 0.300", error)
+        self.assertIn("tilt 0.500 \u00b1 0.020 mrad, encoder behind the gear", loop)
+        self.assertTrue(drawn_error and drawn_loop)
+        self.assertEqual(shown({}), [None, None])
+
     def colours(self):
         """Of the picture's canvas: how many grey levels there are, and how many pixels of the landmarks' green."""
         return self.browser.execute_script("""
@@ -196,6 +218,15 @@ class StatusPage(SystemTest):
         health = self.browser.execute_script(
             "showStatus(arguments[0]); return document.getElementById('health').textContent", status)
         self.assertRegex(health, r"Scene map4901 landmarks; found in 34 of 40 pictures; last not in the map, 7 s ago; 12 born, 3 died")
+
+        for state, said in (("open", r"0 ms later, \u00b1 150 ms; open for 7 s: turn the camera"),
+                            ("found", r"0 ms later, \u00b1 150 ms; found 7 s ago"),
+                            ("calibrated", "calibrated through this connection")):
+            status["link_delay"] = {"state": state, "delay_s": 0, "sigma_s": .15, "age_s": 7}
+            self.assertRegex(self.browser.execute_script(
+                "showStatus(arguments[0]); return document.getElementById('health').textContent", status),
+                "Telemetry against the calibration" + said)
+        self.shows_telemetry_error()
 
         picture = self.browser.find_element(By.ID, "picture")
         clicked = self.direction_of(

@@ -30,6 +30,18 @@ enum class LinkDelayState {
   kFound        // motion has shown the delay
 };
 
+[[nodiscard]] inline const char* to_string(LinkDelayState state) {
+  switch (state) {
+    case LinkDelayState::kCalibrated:
+      return "calibrated";
+    case LinkDelayState::kOpen:
+      return "open";
+    case LinkDelayState::kFound:
+      return "found";
+  }
+  return "open";
+}
+
 class LinkDelay {
  public:
   static constexpr double kRange_s = 0.5;       // either way

@@ -6,6 +6,7 @@ import {rows, say} from './elements.js';
 import {isNumber, withSigma} from './numbers.js';
 import {onNewProcess, record, startId} from './stream.js';
 import {duration} from './time.js';
+import {showTelemetryError} from './telemetry_error.js';
 import {showZoomCurve} from './zoom_curve.js';
 
 const kParameters = [
@@ -31,6 +32,7 @@ function showCalibration(calibration) {
   if (isNumber(calibration.zoom)) entries.push(['Zoom', String(calibration.zoom)]);
   rows('calibration', entries);
   showZoomCurve(calibration.zoom_curve ?? null);
+  showTelemetryError(calibration);
 }
 
 let calibrationSeen = null;  // which calibration is shown
@@ -44,6 +46,7 @@ export async function showCalibrationInUse(status) {
     } else {
       rows('calibration', [['Focal length', `${record.focal_length_px} px`]]);
       showZoomCurve(null);
+      showTelemetryError({});
     }
     calibrationSeen = key;
   }

@@ -20,6 +20,12 @@ function describeLink(link) {
   return `${state}${age}; back again ${link.reconnections} times`;
 }
 
+function describeDelay({state, delay_s: delay, sigma_s: sigma, age_s: age}, milliseconds) {
+  if (state === 'calibrated') return 'calibrated through this connection';
+  const off = `${milliseconds(Math.abs(delay))} ms ${delay < 0 ? 'earlier' : 'later'}, \u00b1 ${milliseconds(sigma)} ms`;
+  return state === 'open' ? `${off}; open for ${duration(age)}: turn the camera` : `${off}; found ${duration(age)} ago`;
+}
+
 function describeSceneMap({landmarks, ready, pictures, last, upkeep}) {
   if (!ready) return 'its index is being made';
   const newest = last ? `; last ${last.status}, ${duration(last.age_s)} ago` : '';
@@ -42,7 +48,7 @@ function showStatus(status) {
   links = status.links;
   say('camera', status.camera);
   say('health-caption', `alidade ${status.alidade}, running for ${duration(status.uptime_s)}; counts are since the start`);
-  const {frames, dropped, video_faults: faultsOfVideo, video_clock: clock, latency_s: latency, page_faults: faults, streams, http} = status;
+  const {frames, dropped, video_faults: faultsOfVideo, video_clock: clock, link_delay: delay, latency_s: latency, page_faults: faults, streams, http} = status;
   const milliseconds = (seconds) => isNumber(seconds) ? String(Number((1000 * seconds).toPrecision(3))).replace('-', '\u2212') : '\u2013';
   rows('health', [
     ['Video link', describeLink(links.video)],
@@ -55,6 +61,7 @@ function showStatus(status) {
     ['Pictures too late to look at', `${dropped.late_pictures}`],
     ['Clock filter of the video', `${clock.locked ? 'locked' : 'warming up'}, \u00b1 ${milliseconds(clock.sigma_s)} ms`],
     ['Its restarts, steps of the delay', `${clock.restarts}, ${clock.floor_shifts}`],
+    ...(delay ? [['Telemetry against the calibration', describeDelay(delay, milliseconds)]] : []),
     ['Frame beyond the newest trusted angle', `${milliseconds(status.telemetry_age_s)} ms`],
     ['Latency p50, p90, p99, max',
       latency === null ? 'not measured' : `${['p50', 'p90', 'p99', 'max'].map((one) => milliseconds(latency[one])).join(', ')} ms`],

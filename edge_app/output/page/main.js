@@ -8,10 +8,12 @@ import {drawPlan} from './plan.js';
 import {drawPlots} from './plots.js';
 import {showRecord} from './state.js';
 import {followForEver} from './stream.js';
+import {drawTelemetryError} from './telemetry_error.js';
 import {drawZoomCurve} from './zoom_curve.js';
 
 function drawAll() {
   drawZoomCurve();
+  drawTelemetryError();
   drawPlan();
   drawPlots();
 }

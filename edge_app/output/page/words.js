@@ -46,6 +46,8 @@ export const kNeeds = {
   'telemetry that describes the motion in the video': 'Readings and video do not agree: check the connection and the signs of the axes.',
   'more of the pictures: the machine is too slow or too busy':
     'Most pictures are never looked at: this machine is too slow, or has too much else to do.',
+  'pictures that are not repeated':
+    'Pictures are sent again while the camera turns: please set the camera, converter or grabber to the rate at which it takes them.',
   'more of the same motion': 'Please go on moving the camera like this.',
   'a steady zoom': 'Please leave the zoom alone.',
   'video whose delay does not wander':

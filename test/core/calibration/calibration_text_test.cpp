@@ -282,6 +282,8 @@ TEST(CalibrationText, RefusesAnErrorOfTelemetryThatIsNone) {
               HasSubstr("motor or output"));
   EXPECT_THAT(refused("pan_play_rad: {value: 0.3, sigma: 1e-5, kind: motor}"),
               HasSubstr("give radians"));
+  EXPECT_THAT(refused("pan_play_rad: {value: -3e-4, sigma: 1e-5, kind: motor}"),
+              HasSubstr("pan_play_rad is -3e-4; give radians, 0 or more"));
   EXPECT_THAT(refused("tilt_play_rad: [1]"), HasSubstr("tilt_play_rad is not a map"));
 }
 

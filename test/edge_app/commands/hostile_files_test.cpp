@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/calibration/calibration_text.h"
 #include "platform/system/file_lock.h"
 #include "test/edge_app/commands/alidade_command.h"
 #include "test/support/process.h"
@@ -108,6 +109,27 @@ TEST_F(HostileFiles, APictureSizeThatNoCameraHasIsRefused) {
   expect_refused(
       {"map", "build", directory_.path(), "-o", path("out.map"), "--focal-length", "400"},
       "recording.yaml:2: width is larger than 16384 px");
+}
+
+TEST_F(HostileFiles, AGearThatTheHeadsStepsCannotShowIsRefused) {
+  Calibration calibration;
+  calibration.camera.width = 320;
+  calibration.camera.height = 240;
+  calibration.camera.focal_length = 3000;
+  CalibrationNotes notes;
+  AngleErrorCurve& curve = notes.telemetry_error.tilt;
+  curve.count = 3;
+  curve.spacing_rad = 2e-4;
+  curve.length_rad = 1e-4;
+  curve.unseen_sigma_rad = 1e-5;
+  directory_.write("gear.yaml", format_calibration(calibration, notes));
+  const std::string file = directory_.write(
+      "steps.yaml",
+      "video: {type: rtsp, url: 'rtsp://127.0.0.1:1/stream', width: 320, height: 240}\n"
+      "pan_tilt: {type: vapix, url: 'http://127.0.0.1:1', angle_quantum_rad: 1e-3}\n"
+      "camera: {focal_length_px: 3000}\ncalibration: {file: gear.yaml, auto: false}\n");
+  expect_refused({"run", "-c", file, "--duration", "0.1"},
+                 "gear.yaml: tilt_error has a period of 0.000628 rad, shorter than the steps");
 }
 
 // The first keeps its calibration; the second says who it is; nothing is left that a third would stumble over.

@@ -124,6 +124,41 @@ TEST(CalibrationReport, NamesWhatLeftAFrameWithoutATrack) {
   }
 }
 
+TEST(CalibrationReport, DrawsWhatTelemetryIsOffBy) {
+  Calibrated run{test::Simulation()};
+  TelemetryError& error = run.result.telemetry_error;
+  const std::string without = run.report();
+  EXPECT_THAT(without, Not(HasSubstr("Telemetry's own error")));
+  error.pan.first_rad = -0.1;
+  error.pan.spacing_rad = 0.02;
+  error.pan.count = 11;
+  for (std::size_t i = 0; i < 11; ++i) {
+    error.pan.values[i] = i % 2 == 0 ? 2e-4 : -2e-4;
+    error.pan.sigmas[i] = 3e-5;
+  }
+  error.pan.length_rad = 0.05;
+  error.pan.unseen_sigma_rad = 2.5e-4;
+  error.tilt_play = {5e-4, 2e-5, PlayKind::kOutput};
+  const std::string page = run.report();
+  EXPECT_EQ(count(page, "<svg"), count(without, "<svg") + 2);
+  for (const char* part :
+       {"Telemetry's own error",
+        "<li>pan: 0.200 mrad (RMS) over 11.5 degrees, known to 0.030; elsewhere 0.250 of it is "
+        "possible</li>",
+        "<li>tilt: play of 0.500 +- 0.020 mrad, the encoder behind the gear</li>",
+        "Telemetry's error over the angle, pan", "true pan, deg", "Play of tilt",
+        "way of the camera, mrad"}) {
+    EXPECT_THAT(page, HasSubstr(part));
+  }
+  EXPECT_THAT(page, Not(HasSubstr("nan")));
+  EXPECT_EQ(count(page, "class=\"band\"") - count(without, "class=\"band\""), 2U);
+  error = {};
+  error.tilt.unseen_sigma_rad = 1e-3;
+  EXPECT_THAT(run.report(),
+              HasSubstr("<li>tilt: up to 1.000 mrad (one sigma), of unknown course</li>"));
+  EXPECT_EQ(count(run.report(), "<svg"), count(without, "<svg"));
+}
+
 TEST(CalibrationReport, LoadsNothingAndRunsNothing) {
   const std::string page = Calibrated{test::Simulation()}.report();
   for (const char* part :

@@ -13,6 +13,7 @@
 #include <thread>
 
 #include "edge_app/output/detection_query.h"
+#include "platform/system/clock.h"
 #include "test/edge_app/output/http_client.h"
 #include "test/edge_app/tracking/detected_scene.h"
 #include "test/support/zoom_by_formula.h"
@@ -48,6 +49,7 @@ class HttpApiTest : public ::testing::Test {
     sources.video_losses = [] { return FrameSourceCounters{3, 4, 5, 6, 7}; };
     sources.ask_for_calibration = [this] { return asked_ = calibrating_; };
     sources.zoom_curve = [this] { return curve_; };
+    sources.telemetry_error = [this] { return telemetry_error_; };
     sources.plane = std::move(plane);
     sources.fit_plane = [](const std::string& body, std::string* answer, std::string* why) {
       *answer = "{\"status\": \"ok\"}\n";
@@ -79,6 +81,7 @@ class HttpApiTest : public ::testing::Test {
   LiveState live_{few_lines()};
   PipelineSummary summary_;
   std::shared_ptr<const ZoomCurve> curve_;
+  std::shared_ptr<const TelemetryError> telemetry_error_;
   bool calibrating_ = false;
   bool asked_ = false;
   HttpServer server_{HttpServerOptions{}};
@@ -171,6 +174,28 @@ TEST_F(HttpApiTest, SaysWhatIsWrongWithTheVideosTimesAndPictures) {
                            "alidade_records_withheld_total{status=\"too few landmarks\"} 0",
                            "alidade_repeated_pictures_total 375", "alidade_video_stamps_left_out 1",
                            "alidade_video_clock_wander_seconds 0.034"}) {
+    EXPECT_THAT(metrics, HasSubstr(std::string("\n") + line + "\n"));
+  }
+}
+
+TEST_F(HttpApiTest, SaysHowLateTelemetryIsAgainstTheCalibration) {
+  EXPECT_TRUE(body_of(get("/api/v1/status"))["link_delay"].is_null());
+  EXPECT_THAT(get("/metrics"), Not(HasSubstr("alidade_link_delay")));
+  summary_.link_delay = LinkDelayReport{LinkDelayState::kOpen, 0, 0.15};
+  summary_.link_delay_since_s = monotonic_now_s() - 100;
+  json told = body_of(get("/api/v1/status"))["link_delay"];
+  EXPECT_EQ(told["state"], "open");
+  EXPECT_EQ(told["delay_s"], 0.0);
+  EXPECT_EQ(told["sigma_s"], 0.15);
+  EXPECT_GE(told["age_s"], 100.0);
+  EXPECT_THAT(get("/metrics"), HasSubstr("\nalidade_link_delay_open 1\n"));
+  summary_.link_delay = LinkDelayReport{LinkDelayState::kFound, -0.085, 0.002};
+  told = body_of(get("/api/v1/status"))["link_delay"];
+  EXPECT_EQ(told["state"], "found");
+  EXPECT_EQ(told["delay_s"], -0.085);
+  const std::string metrics = get("/metrics");
+  for (const char* line : {"alidade_link_delay_seconds -0.085",
+                           "alidade_link_delay_sigma_seconds 0.002", "alidade_link_delay_open 0"}) {
     EXPECT_THAT(metrics, HasSubstr(std::string("\n") + line + "\n"));
   }
 }
@@ -304,6 +329,50 @@ TEST_F(HttpApiTest, TellsTheZoomCurveWithTheCalibration) {
   EXPECT_THAT(metrics, HasSubstr("\nalidade_zoom_curve_nodes 5\n"));
   EXPECT_THAT(metrics, HasSubstr("\nalidade_calibration_zoom_reading 1500\n"));
   EXPECT_THAT(metrics, HasSubstr("\nalidade_zoom_curve_reading{end=\"last\"} 2000\n"));
+}
+
+TEST_F(HttpApiTest, TellsWhatTelemetryIsOffByWithTheCalibration) {
+  OrientationRecord record = record_without_orientation(1);
+  record.calibrated = true;
+  ASSERT_TRUE(live_.write(record));
+  TelemetryError error;
+  telemetry_error_ = std::make_shared<const TelemetryError>(error);
+  const json none = body_of(get("/api/v1/calibration"));
+  for (const char* key : {"pan_error", "tilt_error", "pan_play_rad", "tilt_play_rad"}) {
+    EXPECT_FALSE(none.contains(key)) << key;
+  }
+  error.pan.first_rad = -0.1;
+  error.pan.spacing_rad = 0.05;
+  error.pan.count = 5;
+  for (std::size_t i = 0; i < 5; ++i) {
+    error.pan.values[i] = 1e-4 * static_cast<double>(i);
+    error.pan.sigmas[i] = 1e-5;
+  }
+  error.pan.length_rad = 0.1;
+  error.pan.unseen_sigma_rad = 2e-4;
+  error.tilt.unseen_sigma_rad = 3e-4;
+  error.pan_play = {5e-4, 2e-5, PlayKind::kMotor};
+  telemetry_error_ = std::make_shared<const TelemetryError>(error);
+  const json told = body_of(get("/api/v1/calibration"));
+  const json& pan = told["pan_error"];
+  EXPECT_EQ(pan["knots_rad"], (json{{"first", -0.1}, {"spacing", 0.05}}));
+  ASSERT_EQ(pan["values_rad"].size(), 5U);
+  EXPECT_EQ(pan["values_rad"][4], error.pan.values[4]);
+  EXPECT_EQ(pan["sigma_rad"].size(), 5U);
+  EXPECT_EQ(pan["length_rad"], 0.1);
+  EXPECT_EQ(pan["unseen_sigma_rad"], 2e-4);
+  const json& samples = pan["samples"];
+  ASSERT_GE(samples["angle_rad"].size(), 20U);
+  ASSERT_EQ(samples["error_rad"].size(), samples["angle_rad"].size());
+  EXPECT_EQ(samples["angle_rad"].front(), -0.1);
+  EXPECT_NEAR(samples["angle_rad"].back().get<double>(), 0.1, 1e-12);
+  for (std::size_t i = 0; i < samples["angle_rad"].size(); ++i) {
+    EXPECT_EQ(samples["error_rad"][i], error.pan.at(samples["angle_rad"][i]));
+    EXPECT_EQ(samples["sigma_rad"][i], error.pan.sigma(samples["angle_rad"][i]));
+  }
+  EXPECT_EQ(told["tilt_error"], (json{{"length_rad", 0.0}, {"unseen_sigma_rad", 3e-4}}));
+  EXPECT_EQ(told["pan_play_rad"], (json{{"value", 5e-4}, {"sigma", 2e-5}, {"kind", "motor"}}));
+  EXPECT_FALSE(told.contains("tilt_play_rad"));
 }
 
 TEST_F(HttpApiTest, PassesOnThatAFreshCalibrationIsWanted) {

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <functional>
 #include <limits>
 #include <map>
@@ -90,6 +91,7 @@ struct Feed {
   double poll_s = 0;  // so long before its stamp a sample was asked for; 0: it came by itself
   bool delay_steps = false;  // with the first frame the least delay of the video is another one
   double delay_wander_s = 0;
+  std::function<double(double)> wander_at = {};  // in place of it, by the time
   std::function<void()> before_adjusting = {};
   // A machine with too much to do takes up this share of the frames, and stamps them late, by so much in the mean, but for
   // the sender's clock.
@@ -98,6 +100,8 @@ struct Feed {
   double head_back_s = 0;  // the connection to the head begins anew then
   std::function<std::optional<double>(double)> zoom_at = {};  // in place of zoom, by the time
   std::function<bool(double)> blurred = {};                   // nothing is seen then
+  // The camera takes this share of the pictures, evenly; a converter sends the newest at each frame's time.
+  double converted = 1;
 };
 
 inline std::vector<Published> feed(SelfCalibration* calibration, const Simulation& s,
@@ -147,10 +151,17 @@ inline std::vector<Published> feed(SelfCalibration* calibration, const Simulatio
     tracks.tracker = how.tracker;
     tracks.clock_restarted = tracks.stamp.restarted = how.restarts && frame.frame == 0;
     tracks.delay_stepped = how.delay_steps && frame.frame == 0;
-    tracks.delay_wander_s = how.delay_wander_s;
+    tracks.delay_wander_s = how.wander_at ? how.wander_at(frame.stamp_s) : how.delay_wander_s;
     tracks.oe_status =
         frame.stamp_s >= how.contradicting_from_s ? OeStatus::kContradiction : OeStatus::kOk;
-    for (const TrackedPoint& point : points[frame.frame]) {
+    const auto taken = [&how](std::int64_t number) {
+      return std::floor(static_cast<double>(number) * how.converted);
+    };
+    const double picture = taken(frame.frame);
+    tracks.image_repeated = frame.frame > 0 && picture == taken(frame.frame - 1);
+    if (tracks.image_repeated) tracks.tracker = FrameTracks::Tracker::kNone;
+    const auto shown = static_cast<std::int64_t>(std::ceil(picture / how.converted));
+    for (const TrackedPoint& point : points[shown]) {
       if (tracks.count == kMaxFramePoints || (how.blurred && how.blurred(frame.stamp_s))) break;
       tracks.points[static_cast<std::size_t>(tracks.count++)] = point;
     }

@@ -261,6 +261,40 @@ TEST(SelfCalibration, ReplacesTheCalibrationOfACameraThatWasTurnedOnItsMount) {
               Contains(HasSubstr("the camera is not what the calibration says")));
 }
 
+// The second contradiction cannot come while the delay wanders.
+TEST(SelfCalibration, WidensWhatIsContradictedWhenTheDelayBeginsToWander) {
+  const test::Simulation s = camera();
+  SelfCalibration calibration(options_for(s), nullptr);
+  ASSERT_FALSE(feed(&calibration, s, {}).empty());
+  const Calibration before = calibration.first()->calibration;
+  static_cast<void>(calibration.take_messages());
+  test::Simulation turned = s;
+  turned.pan_axis = (s.pan_axis + Eigen::Vector3d(0, 0.005, 0)).normalized();
+  turned.tilt_axis = (s.tilt_axis + Eigen::Vector3d(0.005, 0, 0)).normalized();
+  turned.duration_s = 40;
+  Feed how;
+  how.tracker = FrameTracks::Tracker::kOe;
+  how.from_s = 20;
+  how.first_frame = 1000;
+  bool contradicted = false;
+  how.wander_at = [&](double) {
+    for (const std::string& line : calibration.take_messages()) {
+      contradicted = contradicted || line.find("not what the calibration says") != line.npos;
+    }
+    return contradicted ? 0.05 : 0.0;
+  };
+  const auto published = feed(&calibration, turned, how);
+  ASSERT_EQ(published.size(), 1U);
+  const PublishedCalibration& widened = *published[0].calibration;
+  EXPECT_TRUE(widened.calibrated);
+  EXPECT_EQ(widened.calibration.camera.focal_length, before.camera.focal_length);
+  const double growth = widened.calibration.covariance(0, 0) / before.covariance(0, 0);
+  EXPECT_GT(growth, 60.0 / 8);
+  EXPECT_NEAR(widened.calibration.covariance(5, 5) / before.covariance(5, 5), growth,
+              1e-9 * growth);
+  EXPECT_EQ(calibration.report().activity, CalibrationActivity::kWatching);
+}
+
 TEST(SelfCalibration, WithdrawsWhatLandmarksContradictForLong) {
   const test::Simulation s = camera();
   SelfCalibrationOptions options = options_for(s);
@@ -359,6 +393,18 @@ TEST(SelfCalibration, DoesNotTakeUpAgainWhatItHasWithdrawn) {
   how.from_s += 20;
   how.first_frame += 1000;
   EXPECT_EQ(feed(&calibration, briefly, how).size(), 1U);
+}
+
+TEST(SelfCalibration, SaysThatPicturesAreRepeatedAndDoesNotBlameTelemetry) {
+  const test::Simulation s = camera();
+  SelfCalibration calibration(options_for(s), nullptr);
+  Feed how;
+  how.converted = 0.6;
+  EXPECT_THAT(feed(&calibration, s, how), IsEmpty());
+  EXPECT_EQ(calibration.report().need, CalibrationNeed::kFreshPictures);
+  EXPECT_THAT(calibration.take_messages(),
+              ::testing::ElementsAre(AllOf(HasSubstr("pictures are repeated: up to 40 %"),
+                                           Not(HasSubstr("positive")))));
 }
 
 // Landmarks that disagree with telemetry then tell of the video's times, not of the camera.

@@ -122,10 +122,11 @@ class LinkDelayStep : public testing::Test {
       const OrientationRecord record = step.add_frame(stamp, image(k), &events);
       step.maintain();
       EXPECT_EQ(guard.count(), 0);
-      if (events.link_delay_s) {
+      EXPECT_EQ(events.link_delay.has_value(), options.calibrated);
+      if (events.link_delay_told && events.link_delay) {
         seen.told_s = std::min(seen.told_s, time_s);
-        seen.told_delay_s = *events.link_delay_s;
-        seen.told_sigma_s = events.link_delay_sigma_s;
+        seen.told_delay_s = events.link_delay->delay_s;
+        seen.told_sigma_s = events.link_delay->sigma_s;
         ++seen.tellings;
       }
       seen.time_sigma_s = record.time_sigma_s;
