@@ -70,6 +70,7 @@ StageStatus run(const CalibrationInput& input, const CalibrationOptions& options
 
   internal::StagedAdjustment adjustment(start, motion.noise, options, &selected);
   adjustment.adjust_robustly();
+  result->exclusions.observations_drifting = adjustment.drifting();
   status = report(options, 0.7, "adjustment");
   if (!status.ok()) return status;
   status = adjustment.adjust_on_inliers(&result->quality);

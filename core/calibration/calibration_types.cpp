@@ -86,6 +86,8 @@ std::vector<std::string> CalibrationExclusions::describe() const {
   add(observations_unknown_frame, "observations in frames without a stamp");
   add(observations_of_single_landmarks, "observations of landmarks seen only once");
   add(observations_outliers, "observations that are outliers");
+  add(observations_drifting,
+      "observations of what drifts against the telemetry, as clouds or water do");
   add(telemetry_not_finite, "telemetry samples that are not numbers");
   add(telemetry_duplicate, "telemetry samples that repeat a sequence number or stamp");
   add(telemetry_outliers, "telemetry samples that are outliers");

@@ -146,6 +146,7 @@ struct CalibrationExclusions {
   int observations_unknown_frame = 0;
   int observations_of_single_landmarks = 0;  // a landmark seen once says nothing
   int observations_outliers = 0;
+  int observations_drifting = 0;  // of what drifts against the telemetry: clouds, water, traffic
   int telemetry_not_finite = 0;
   int telemetry_duplicate = 0;
   int telemetry_outliers = 0;

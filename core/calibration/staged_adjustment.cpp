@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdio>
 #include <utility>
 #include <vector>
 
@@ -34,6 +35,48 @@ double median_error(const std::vector<LinearisedResidual>& residuals) {
   return errors.empty() ? 1.0 : median(std::move(errors));
 }
 
+// Landmarks that are to be left out, with their observations.
+int leave_out(const std::vector<char>& out, SelectedInput* selected,
+              std::vector<AdjustmentState*> states) {
+  AdjustmentData& data = selected->data;
+  std::vector<int> number(out.size(), 0);
+  int kept = 0;
+  for (std::size_t l = 0; l < out.size(); ++l) {
+    number[l] = kept;
+    if (out[l] != 0) continue;
+    const auto to = static_cast<std::size_t>(kept++);
+    selected->landmark_name[to] = selected->landmark_name[l];
+    for (AdjustmentState* state : states) state->landmarks[to] = state->landmarks[l];
+  }
+  std::size_t next = 0;
+  for (std::size_t i = 0; i < data.observations.size(); ++i) {
+    const auto landmark = static_cast<std::size_t>(data.observations[i].landmark);
+    if (out[landmark] != 0) continue;
+    data.observations[next] = data.observations[i];
+    data.observations[next].landmark = number[landmark];
+    selected->observation_index[next++] = selected->observation_index[i];
+  }
+  const auto left_out = static_cast<int>(data.observations.size() - next);
+  data.observations.resize(next);
+  selected->observation_index.resize(next);
+  selected->landmark_name.resize(static_cast<std::size_t>(kept));
+  for (AdjustmentState* state : states) state->landmarks.resize(static_cast<std::size_t>(kept));
+  return left_out;
+}
+
+std::string drift_text(DriftFinding finding, double px_s) {
+  char text[400];
+  std::snprintf(text, sizeof text,
+                finding == DriftFinding::kAll
+                    ? "all that is in view drifts against the telemetry, by some %.2g px/s, as "
+                      "clouds or water do: take in something that stands still"
+                    : "a part of the picture drifts against the rest, by %.2g px/s, as clouds or "
+                      "water do, and the telemetry is too noisy to say which of them stands still: "
+                      "record for longer, or take in more that stands still",
+                px_s);
+  return text;
+}
+
 }  // namespace
 
 StagedAdjustment::StagedAdjustment(const StartValues& start, const TelemetryAngleNoise& noise,
@@ -50,6 +93,7 @@ StagedAdjustment::StagedAdjustment(const StartValues& start, const TelemetryAngl
 
 void StagedAdjustment::adjust_robustly() {
   settled_ = settle_robustly();
+  if (leave_out_drifting()) settled_ = settle_robustly();
   if (settled_ && noise_.resolution_rad > 0) {
     replace_rounded_telemetry();
     settled_ = settle_robustly();
@@ -60,6 +104,9 @@ void StagedAdjustment::adjust_robustly() {
 }
 
 StageStatus StagedAdjustment::adjust_on_inliers(CalibrationQuality* quality) {
+  if (drift_ == DriftFinding::kAll || drift_ == DriftFinding::kUndecided) {
+    return {CalibrationStatus::kTelemetryMismatch, drift_text(drift_, drift_px_s_)};
+  }
   quality->pixel_sigma_ratio = 1;
   quality->telemetry_sigma_ratio = 1;
   bool converged = settled_;
@@ -107,6 +154,18 @@ bool StagedAdjustment::settle_robustly() {
     if (settled && loss.pixel == kRobustScale) return true;
   }
   return settled;
+}
+
+// True if something was left out; the adjustment then begins anew.
+bool StagedAdjustment::leave_out_drifting() {
+  const DriftingTracks found =
+      find_drifting_tracks(&selected_->data, adjusted_.state, &adjustment_);
+  drift_ = found.finding;
+  drift_px_s_ = found.rate.norm() * adjusted_.state.camera.focal_length;
+  if (drift_ != DriftFinding::kGroup) return false;
+  drifting_ = leave_out(found.drifts, selected_, {&start_, &adjusted_.state});
+  adjusted_.state = start_;
+  return true;
 }
 
 bool StagedAdjustment::settle_on_inliers() {

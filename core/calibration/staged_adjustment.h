@@ -5,6 +5,7 @@
 #include <string>
 
 #include "core/calibration/adjustment.h"
+#include "core/calibration/drifting_tracks.h"
 #include "core/calibration/input_selection.h"
 #include "core/calibration/stage_status.h"
 #include "core/calibration/start_values.h"
@@ -28,10 +29,10 @@ class StagedAdjustment {
                    const CalibrationOptions& options, SelectedInput* selected);
 
   // Cauchy loss, whose scale follows the medians of the residuals, down to 3 sigmas. Splits
-  // segments of the spline if the residuals ask for it (knot_choice.h). Then replaces rounded
-  // telemetry by its crossings (rounded_telemetry.h), which need a trajectory that is already
-  // close. Subtracts the departures that telemetry shows (telemetry_departures.h). Marks outliers
-  // at the end.
+  // segments of the spline if the residuals ask for it (knot_choice.h). Leaves out what drifts, and
+  // begins anew if anything does (drifting_tracks.h). Then replaces rounded telemetry by its
+  // crossings (rounded_telemetry.h), which need a trajectory that is already close. Subtracts the
+  // departures that telemetry shows (telemetry_departures.h). Marks outliers at the end.
   void adjust_robustly();
 
   // Least squares on the rest, as a robust loss on good data would inflate the sigmas. Outliers are
@@ -42,9 +43,12 @@ class StagedAdjustment {
   [[nodiscard]] StageStatus adjust_on_inliers(CalibrationQuality* quality);
 
   [[nodiscard]] const Adjusted& adjusted() const { return adjusted_; }
+  // Observations that were left out as they drift.
+  [[nodiscard]] int drifting() const { return drifting_; }
 
  private:
   [[nodiscard]] bool settle_robustly();
+  [[nodiscard]] bool leave_out_drifting();
   [[nodiscard]] bool settle_on_inliers();
   [[nodiscard]] bool settle_departures();
   [[nodiscard]] bool settle_known_departures();
@@ -67,6 +71,9 @@ class StagedAdjustment {
   AdjustmentState start_;
   double telemetry_unknowns_ = 0;
   bool settled_ = false;  // by settle_robustly()
+  DriftFinding drift_ = DriftFinding::kNone;
+  double drift_px_s_ = 0;
+  int drifting_ = 0;  // observations
 };
 
 }  // namespace alidade::internal

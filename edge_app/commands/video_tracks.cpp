@@ -118,7 +118,9 @@ VideoTracks track_video(const std::string& directory, const CalibrationInput& in
         FrameOrientation orientation;
         const OeStatus status = mode->process(image, time->second, &prediction, &orientation);
         const std::size_t before = tracks.observations.size();
-        for (int i = 0; status == OeStatus::kOk && i < mode->statistics().found; ++i) {
+        // Whether what was found moves, the calibration says.
+        const bool found_any = status == OeStatus::kOk || status == OeStatus::kSceneMoves;
+        for (int i = 0; found_any && i < mode->statistics().found; ++i) {
           const OeObservation& found = mode->observations()[i];
           if (const auto sigma = track_sigma(found))
             tracks.observations.push_back({frame, found.id, found.u.x(), found.u.y(), *sigma});

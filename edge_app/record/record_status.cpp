@@ -33,6 +33,8 @@ RecordStatus status_of_landmarks(OeStatus landmarks) {
       return RecordStatus::kTooFewLandmarks;
     case OeStatus::kContradiction:
       return RecordStatus::kContradiction;
+    case OeStatus::kSceneMoves:
+      return RecordStatus::kSceneMoves;
     case OeStatus::kBadImage:
       return RecordStatus::kBadImage;
     case OeStatus::kLensMoves:

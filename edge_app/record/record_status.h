@@ -39,6 +39,7 @@ enum class RecordStatus : std::uint8_t {
   kFrameBeforeTelemetry,  // older than the oldest sample kept by more than max_extrapolation_s
   kTooFewLandmarks,       // mode PT: too few landmarks held
   kContradiction,         // mode PT: landmarks and telemetry exclude each other
+  kSceneMoves,            // mode PT: what is in view moves, or it is not known what of it
   kBadImage,              // mode PT: no image, or not of the calibration's size
   kImageTooLate,          // mode PT: other frames waited behind this one, so it lost its image
   kImageRepeated,  // the image before was sent again while the camera turned (RepeatedImages)
@@ -106,6 +107,8 @@ constexpr const char* to_string(RecordStatus status) {
       return "too few landmarks";
     case RecordStatus::kContradiction:
       return "landmarks contradict telemetry";
+    case RecordStatus::kSceneMoves:
+      return "scene moves";
     case RecordStatus::kBadImage:
       return "no usable picture";
     case RecordStatus::kImageTooLate:

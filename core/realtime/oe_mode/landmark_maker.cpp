@@ -173,7 +173,9 @@ bool LandmarkMaker::make_one(const View& view, const FastCorner& corner, int oct
   if (rolling_shutter_unproject(calibration.camera, calibration.mechanics, calibration.line_delay,
                                 view.frame.motion, u, &landmark.d, &J_d_u, &J_d_motion,
                                 &J_d_parameters) != ProjectionStatus::kOk ||
-      view.map->cell_taken(landmark.d, octave, view.frame.lens.zoom)) {
+      view.map->cell_taken(landmark.d, octave, view.frame.lens.zoom) ||
+      (view.frame.moving != nullptr &&
+       view.frame.moving->contains(landmark.d, view.frame.time_s))) {
     return false;
   }
   for (int row = 0; row < kReferencePixels; ++row) {

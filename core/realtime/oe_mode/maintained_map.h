@@ -9,6 +9,7 @@
 // constructor takes all memory; only state() allocates. One thread.
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 
 #include "core/model/calibration.h"
@@ -49,6 +50,10 @@ class MaintainedMap {
   void change_lens(const Calibration& calibration) {
     in_view_.change_lens(calibration, cone_margin_);
     shear_.change_lens(calibration);
+  }
+  // The landmark in this slot, if it is still this one.
+  void retire(int slot, std::uint32_t id) {
+    if (landmarks_.occupied(slot) && landmarks_.at(slot).id == id) landmarks_.retire(slot);
   }
   // Moves all landmarks to parameters that are `change` * direction away.
   void move(double change, const ParameterDirection& direction);

@@ -138,6 +138,7 @@ bool MapOffsetFilter::learn(double frame_time_s, const OffsetInnovation& innovat
   const Matrix2<double> covariance = noise_of(frame_time_s, innovation);
   const Vector2<double> before = offset_.covariance.diagonal();
   const Vector2<double> seen = offset_.value + innovation.value - lens_.value * innovation.by_lens;
+  remember_seen(frame_time_s, innovation, seen, covariance);
   if (innovation.error.exists()
           ? !learn_beside_error(innovation, covariance)
           : !learn_offset(innovation, covariance, options_.max_contradiction)) {
@@ -153,8 +154,33 @@ bool MapOffsetFilter::learn(double frame_time_s, const OffsetInnovation& innovat
 void MapOffsetFilter::note_contradiction(double frame_time_s, const OffsetInnovation& innovation) {
   const Vector2<double> left = innovation.value - lens_.value * innovation.by_lens;
   if (!(left.cwiseAbs().maxCoeff() < OffsetAxisCells::kLargestError_rad)) return;
-  note_in_cells(frame_time_s, innovation, offset_.value + left,
-                noise_of(frame_time_s, innovation).diagonal(), Vector2<double>::Zero());
+  const Matrix2<double> covariance = noise_of(frame_time_s, innovation);
+  remember_seen(frame_time_s, innovation, offset_.value + left, covariance);
+  note_in_cells(frame_time_s, innovation, offset_.value + left, covariance.diagonal(),
+                Vector2<double>::Zero());
+}
+
+void MapOffsetFilter::remember_seen(double frame_time_s, const OffsetInnovation& innovation,
+                                    const Vector2<double>& offset,
+                                    const Matrix2<double>& covariance) {
+  constexpr double kUsualLength_rad = 0.05;  // of an error whose length is not known
+  const AngleError& error = innovation.error;
+  seen_.time_s = frame_time_s;
+  seen_.angle = error.angle;
+  seen_.offset = offset;
+  seen_.variance = covariance.diagonal();
+  for (int i = 0; i < 2; ++i) {
+    const double length = error.length[i] > 0 ? error.length[i] : kUsualLength_rad;
+    seen_.slope_sigma[i] = std::sqrt(std::max(0.0, error.variance[i])) / length;
+  }
+  has_seen_ = true;
+}
+
+bool MapOffsetFilter::take_seen(SeenOffset* out) {
+  if (!has_seen_) return false;
+  *out = seen_;
+  has_seen_ = false;
+  return true;
 }
 
 bool MapOffsetFilter::learn_offset(const OffsetInnovation& innovation,

@@ -17,6 +17,7 @@
 #include "core/realtime/oe_mode/covariance.h"
 #include "core/realtime/oe_mode/lens_scale.h"
 #include "core/realtime/oe_mode/offset_cells.h"
+#include "core/realtime/oe_mode/scene_drift.h"
 #include "core/realtime/telemetry/telemetry_interpolation.h"
 
 namespace alidade {
@@ -143,6 +144,8 @@ class MapOffsetFilter {
              const AngleError& error = {});
   // A frame was answered with telemetry that was not extrapolated. False if nothing was learnt.
   bool learn(double frame_time_s, const OffsetInnovation& innovation);
+  // True once for each frame that was learnt from, or that telemetry contradicted.
+  [[nodiscard]] bool take_seen(SeenOffset* out);
   // Telemetry contradicted the landmarks in a frame. The cells keep it, as the error may depend on
   // the angle.
   void note_contradiction(double frame_time_s, const OffsetInnovation& innovation);
@@ -181,6 +184,8 @@ class MapOffsetFilter {
   [[nodiscard]] Matrix2<double> noise_of(double frame_time_s,
                                          const OffsetInnovation& innovation) const;
   void learn_error();
+  void remember_seen(double frame_time_s, const OffsetInnovation& innovation,
+                     const Vector2<double>& offset, const Matrix2<double>& covariance);
   [[nodiscard]] bool learn_offset(const OffsetInnovation& innovation,
                                   const Matrix2<double>& covariance, double max_chi_square);
   [[nodiscard]] bool learn_beside_error(const OffsetInnovation& innovation,
@@ -205,6 +210,8 @@ class MapOffsetFilter {
   std::size_t first_pending_ = 0;
   std::size_t pending_count_ = 0;
   bool contradicted_ = false;
+  SeenOffset seen_;
+  bool has_seen_ = false;
 };
 
 }  // namespace alidade

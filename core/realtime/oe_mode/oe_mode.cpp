@@ -26,10 +26,12 @@ OeMode::OeMode(const OeOptions& options)
       prediction_(options.prediction),
       search_(options.search, map_.landmarks().capacity()),
       offset_(options.offset),
-      tie_(options.tie) {}
+      tie_(options.tie),
+      drift_(map_.landmarks().capacity()) {}
 
 std::size_t OeMode::memory_bytes() const {
-  return sizeof(*this) + image_.memory_bytes() + map_.memory_bytes() + search_.memory_bytes();
+  return sizeof(*this) + image_.memory_bytes() + map_.memory_bytes() + search_.memory_bytes() +
+         drift_.memory_bytes();
 }
 
 void OeMode::reset(const Calibration& calibration, FocalLength focal_length) {
@@ -43,6 +45,8 @@ void OeMode::reset(const Calibration& calibration, FocalLength focal_length) {
   map_.reset(calibration);
   offset_.forget_error();
   forget_map();
+  drift_.reset();
+  moving_.clear();
   frames_ = 0;
 }
 
@@ -116,6 +120,8 @@ void OeMode::begin_frame(const ImageView& image, double frame_time_s,
   frame_.image = image;
   frame_.telemetry = FrameTelemetry::kNone;
   frame_.error = {};
+  frame_.solved = false;
+  frame_.moving = &moving_;
   if (telemetry == nullptr) return;
   frame_.telemetry =
       telemetry->extrapolated ? FrameTelemetry::kExtrapolated : FrameTelemetry::kEnclosed;
@@ -224,7 +230,9 @@ OeStatus OeMode::answer_without_landmarks(const PredictedMotion& predicted,
                                           const Solution& solution, FrameOrientation* out) {
   const bool has_telemetry = frame_.telemetry != FrameTelemetry::kNone;
   const bool contradiction = solution.status == SolveStatus::kContradiction;
-  search_.conclude(Vector6::Zero());
+  search_.conclude(contradiction ? solution.solved.correction : Vector6::Zero(),
+                   contradiction ? solution.solved.zoom.correction : Vector2<double>::Zero());
+  frame_.solved = contradiction;
   calibration_.note_lost();
   frame_.motion = predicted.motion;
   frame_.covariance = predicted.covariance;
@@ -238,9 +246,12 @@ OeStatus OeMode::answer_without_landmarks(const PredictedMotion& predicted,
   map_.note_lost(contradiction,
                  solution.status == SolveStatus::kTooFew && has_telemetry && !new_view);
   if (!has_telemetry) return finish(OeStatus::kNoPrediction);
-  if (!contradiction) return finish(OeStatus::kTooFew);
+  if (!contradiction) {
+    return finish(drift_.is_on_trial() ? OeStatus::kSceneMoves : OeStatus::kTooFew);
+  }
   if (frame_.telemetry == FrameTelemetry::kEnclosed && !lens_is_learnt()) {
     offset_.note_contradiction(frame_.time_s, innovation_of(predicted, solution.solved));
+    note_offsets();
   }
   // One of the two is wrong, and it is unknown which: the answer must cover both.
   MotionCovariance covering = out->motion_covariance;
@@ -256,6 +267,9 @@ OeStatus OeMode::answer_without_landmarks(const PredictedMotion& predicted,
 OeStatus OeMode::answer_with_landmarks(const PredictedMotion& predicted, const Solution& solution,
                                        FrameOrientation* out) {
   const SolvedMotion& solved = solution.solved;
+  const bool has_telemetry = frame_.telemetry != FrameTelemetry::kNone;
+  const bool withheld = has_telemetry && drift_.withholds();
+  FrameOrientation by_landmarks;
   const bool enclosed = frame_.telemetry == FrameTelemetry::kEnclosed;
   FrameMotion<double> motion = solution.motion;
   add(solved.correction, &motion);
@@ -299,15 +313,18 @@ OeStatus OeMode::answer_with_landmarks(const PredictedMotion& predicted, const S
     if (own_lens() != nullptr) own_lens()->to_frame(&sensitivity);
   }
   if (!make_frame_orientation(calibration_.of_answer(), frame_.time_s, OrientationMode::kOe,
-                              solved.inliers, in_base, covariance, sensitivity, out)) {
-    return finish(frame_.telemetry != FrameTelemetry::kNone ? OeStatus::kTooFew
-                                                            : OeStatus::kNoPrediction);
+                              solved.inliers, in_base, covariance, sensitivity, &by_landmarks)) {
+    return finish(has_telemetry ? OeStatus::kTooFew : OeStatus::kNoPrediction);
   }
-  if (own_lens() != nullptr) out->zoom_rate_sigma = rate_sigma(solved);
-  note_landmarks_answer(solved, added);
+  if (own_lens() != nullptr) by_landmarks.zoom_rate_sigma = rate_sigma(solved);
+  if (!withheld) {
+    *out = by_landmarks;
+    note_landmarks_answer(solved, added);
+  }
   if (enclosed) {
     // A contradiction does not get here: see solve_orientation().
     static_cast<void>(offset_.learn(frame_.time_s, innovation_of(predicted, solved)));
+    note_offsets();
   }
   if (lens_is_learnt()) {
     offset_.learn_scale(frame_.time_s, solved.lens.measured, solved.lens.information,
@@ -324,7 +341,8 @@ OeStatus OeMode::answer_with_landmarks(const PredictedMotion& predicted, const S
   statistics_.rate = motion.rate;
   statistics_.map = maps_;
   frame_.use = MapUse::kHeld;
-  return finish(OeStatus::kOk);
+  frame_.solved = true;
+  return finish(withheld ? OeStatus::kSceneMoves : OeStatus::kOk);
 }
 
 }  // namespace alidade

@@ -4,6 +4,9 @@
 // One estimator for OE and PT: without landmarks the solution is telemetry's, with its covariance.
 // If landmarks contradict telemetry beyond both covariances, the answer is telemetry's with a
 // covariance that covers both, and the mode is PT.
+// What drifts against telemetry is no ground (scene_drift.h): its landmarks are retired, and none
+// are made there for a while (moving_directions.h). While it is not known what stands still, the
+// answer is telemetry's.
 // Map, offset and answer carry their dependence on the calibration (Sensitivity). The answer's
 // covariance includes the calibration's.
 // Fixed memory, taken by the constructor; nothing else allocates, waits or throws. One thread.
@@ -24,8 +27,10 @@
 #include "core/realtime/oe_mode/map_offset_filter.h"
 #include "core/realtime/oe_mode/map_state.h"
 #include "core/realtime/oe_mode/motion_prediction.h"
+#include "core/realtime/oe_mode/moving_directions.h"
 #include "core/realtime/oe_mode/oe_options.h"
 #include "core/realtime/oe_mode/processed_frame.h"
+#include "core/realtime/oe_mode/scene_drift.h"
 #include "core/realtime/telemetry/telemetry_interpolation.h"
 
 namespace alidade {
@@ -34,6 +39,7 @@ enum class OeStatus {
   kOk,             // orientation from landmarks and telemetry
   kTooFew,         // too few landmarks held: telemetry alone
   kContradiction,  // landmarks and telemetry exclude each other: telemetry, covering both
+  kSceneMoves,     // what is in view moves, or it is not known what of it: telemetry alone
   kNoPrediction,   // neither telemetry nor a previous frame: nothing is written
   kBadImage,       // no image, or not of the calibration's size: telemetry alone
   kLensMoves,      // no map begins with a moving lens, or the lens is unknown: telemetry alone
@@ -124,6 +130,7 @@ class OeMode {
 
   // Upkeep of the map with the last frame (processed_frame.h), to be called after its answer is
   // out. Does nothing if that frame has no sure orientation.
+  //     leave out what moves                        scene_drift.h
   //   6 refine and retire landmarks (PTCEE 36)      map_upkeep.h
   //   7 straighten the map by neighbouring frames   map_shear.h
   //   8 make landmarks where cells are empty        landmark_maker.h
@@ -225,6 +232,9 @@ class OeMode {
                 Sensitivity<6>* sensitivity) const;
   void follow_lens();
 
+  void note_offsets();
+  // True if the map has to begin anew, as it followed what moves.
+  [[nodiscard]] bool judge_scene();
   void begin_map();
   void straighten(const ShearCorrection& correction);
   void forget_map();
@@ -241,6 +251,8 @@ class OeMode {
   LandmarkSearch search_;
   MapOffsetFilter offset_;
   BaseTie tie_;
+  SceneDrift drift_;
+  MovingDirections moving_;
 
   OeStatistics statistics_;
   ProcessedFrame frame_;  // written by process(), used up by maintain()

@@ -27,6 +27,7 @@ Matrix6 OeMode::covariance_of_answer(const SolvedMotion& solved, const TiedOffse
   covariance.topLeftCorner<2, 2>() +=
       by_map ? tie_.covariance_in(shared_by_view(solved)) : added.covariance;
   map_.shear().add_to(&covariance);
+  covariance.topLeftCorner<2, 2>() += drift_.doubt();
   return covariance;
 }
 

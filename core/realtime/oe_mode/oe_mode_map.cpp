@@ -1,7 +1,11 @@
 // The map of OeMode: handed over, kept up by frames, begun anew.
 
+#include <Eigen/LU>
 #include <algorithm>
+#include <cstddef>
+#include <cstdint>
 
+#include "core/model/direction.h"
 #include "core/realtime/oe_mode/oe_mode.h"
 
 namespace alidade {
@@ -45,6 +49,7 @@ void OeMode::forget_map() {
   }
   map_.begin(calibration);
   search_.clear();
+  drift_.begin_map();
   offset_.begin_lens(calibration_.scale_of_given());
   offset_.reset();
   prediction_.reset(calibration);
@@ -69,6 +74,10 @@ void OeMode::maintain() {
     forget_map();
     return;
   }
+  if (judge_scene()) {
+    forget_map();
+    return;
+  }
   const MapUse use = frame_.use;
   frame_.use = MapUse::kNone;  // whatever follows is done once
   if (use != MapUse::kHeld && use != MapUse::kNewView) return;
@@ -78,6 +87,8 @@ void OeMode::maintain() {
     // 6. and 7.
     const auto correction = map_.refine(calibration, frame_, search_, calibration_.lens().moves());
     if (correction) straighten(*correction);
+    drift_.for_each_moving([&](int slot, std::uint32_t id, const Vector3<double>&,
+                               const Vector2<double>&) { map_.retire(slot, id); });
     map_.judge_coarse(calibration, image_, frame_, search_);
   } else {
     map_.begin_shear(frame_);
@@ -87,6 +98,42 @@ void OeMode::maintain() {
   // This share of the map now has this frame's scale.
   if (lens != nullptr) offset_.doubt_scale(share_of_new * frame_.lens.covariance(0, 0));
   follow_lens();
+}
+
+void OeMode::note_offsets() {
+  SeenOffset seen;
+  if (offset_.take_seen(&seen)) drift_.note(seen);
+}
+
+bool OeMode::judge_scene() {
+  constexpr double kCells = 0.6;  // of a landmark's, around it
+  if (!frame_.solved) return false;
+  frame_.solved = false;
+  if (own_lens() != nullptr) {
+    drift_.begin_map();
+    return false;
+  }
+  drift_.begin_frame(frame_.time_s, {frame_.motion.rate.pan, frame_.motion.rate.tilt});
+  const auto& observations = search_.observations();
+  for (std::size_t i = 0; i < observations.size(); ++i) {
+    const OeObservation& seen = observations[i];
+    if (!map_.landmarks().occupied(seen.slot)) continue;
+    const Landmark& landmark = map_.landmarks().at(seen.slot);
+    const LandmarkStatistics& s = landmark.statistics;
+    const Vector2<double> off = search_.J_tangent()[i].inverse() * seen.residual;
+    if (!all_finite(off)) continue;
+    drift_.note_landmark(seen.slot, seen.id, direction_plus<double>(landmark.d, off),
+                         (s.matched + 1.0) / (s.looked_for + 1.0));
+  }
+  const double pixel = 1 / camera().focal_length;
+  const SceneVerdict verdict = drift_.judge(pixel);
+  const double radius = kCells * options_.maker.cell_size_px * pixel;
+  drift_.for_each_moving(
+      [&](int, std::uint32_t, const Vector3<double>& d, const Vector2<double>& rate) {
+        moving_.add(d, rate, radius, frame_.time_s);
+      });
+  return verdict == SceneVerdict::kAllMove || verdict == SceneVerdict::kMapMoves ||
+         (verdict == SceneVerdict::kPartMoves && drift_.has_bent_map());
 }
 
 // The map's frame becomes telemetry's present one.
@@ -134,6 +181,7 @@ void OeMode::settle_pending(const InterpolatedPanTilt* late) {
     offset_.widen(calibration_.of_frame(), &widened);
   }
   offset_.settle_oldest(calibration_.of_frame(), late != nullptr ? &widened : nullptr);
+  note_offsets();
 }
 
 void OeMode::forget_pending() { offset_.forget_pending(); }

@@ -8,6 +8,7 @@
 #include "core/realtime/image/image_view.h"
 #include "core/realtime/lens/own_lens.h"
 #include "core/realtime/oe_mode/covariance.h"
+#include "core/realtime/oe_mode/moving_directions.h"
 #include "core/realtime/oe_mode/offset_cells.h"
 
 namespace alidade {
@@ -43,6 +44,8 @@ struct ProcessedFrame {
   Sensitivity<6> sensitivity = Sensitivity<6>::Zero();  // of motion
   double inflation = 1;  // of the landmarks' covariances, from their residuals
   OwnLens lens;
+  bool solved = false;  // landmarks agreed with each other, whatever telemetry said
+  const MovingDirections* moving = nullptr;  // where no landmark is made; null: everywhere
 };
 
 }  // namespace alidade

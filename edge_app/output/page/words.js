@@ -18,6 +18,7 @@ export const kWhy = {
   'frame before telemetry': 'The picture is older than all pan/tilt readings.',
   'too few landmarks': 'Too few landmarks were recognised.',
   'landmarks contradict telemetry': 'Landmarks and pan/tilt readings contradict each other.',
+  'scene moves': 'What is in view moves, as clouds or water do, or it is not known yet what of it stands still.',
   'no usable picture': 'The picture is missing or damaged.',
   'picture too late': 'The processor is behind: the picture had waited too long and was not looked at.',
   'picture repeated': 'The picture is the one before, sent again while the camera turned.',

@@ -1,0 +1,73 @@
+#pragma once
+// DriftFit: the adjustment, linearised once, with a drift for chosen landmarks: turned back by
+// (pan, tilt) rates w, the landmark is at rest,
+//   error = J_angle p(t) + J_camera g + J_landmark d_l + J_angle w_l (t - t_l) + noise.
+// Trajectory, parameters and landmarks are solved for; telemetry and priors count as ever, so that
+// drifts are against telemetry. Observations that fit no drift count less, as in telemetry_fit.h.
+// Rates in rad/s. Allocates.
+
+#include <Eigen/Core>
+#include <array>
+#include <vector>
+
+#include "core/calibration/adjustment.h"
+#include "core/calibration/linearisation.h"
+
+namespace alidade::internal {
+
+class DriftFit {
+ public:
+  // Of one landmark, given all that landmarks share.
+  struct Track {
+    double begin_s = 0;
+    double middle_s = 0;  // mean time
+    double end_s = 0;
+    int observations = 0;
+    Vector2<double> rate = Vector2<double>::Zero();
+    Matrix2<double> covariance = Matrix2<double>::Zero();  // of its own noise
+    Vector4<double> gradient = Vector4<double>::Zero();    // of (d_l, w_l), in `normal`'s terms
+    Matrix4<double> normal = Matrix4<double>::Zero();
+    std::vector<int> points;  // control points
+    Eigen::MatrixXd cross;    // rows: points, then camera
+  };
+
+  // Of all observations, whatever their marks, which stay; of at most some ten thousand, evenly
+  // over the frames.
+  DriftFit(AdjustmentData* data, const AdjustmentState& state, Adjustment* adjustment);
+
+  // Solves with drifts for landmarks that are not at rest, and sets each track's rate. Returns the
+  // sum of squares at the minimum, less that of zero unknowns; nothing if it has no minimum.
+  [[nodiscard]] bool solve(const std::vector<char>& at_rest, double* cost);
+
+  [[nodiscard]] const std::vector<Track>& tracks() const { return tracks_; }  // by landmark
+
+ private:
+  struct Row {
+    int landmark = 0;
+    double time_s = 0;
+    TrajectorySpline::Basis basis;
+    Vector2<double> error;
+    Matrix2<double> J_angle;
+    Matrix2<double> J_landmark;
+    Eigen::Matrix<double, 2, kObservedCount> J_camera;
+    double weight = 1;
+  };
+
+  void find_tracks();
+  void form_equations();
+  // Weights by what is left at the latest solution.
+  void weigh();
+  [[nodiscard]] Vector4<double> landmark_solution(const Track& track) const;
+
+  std::array<bool, kGlobalCount> fixed_;
+  Eigen::MatrixXd known_;  // of telemetry and priors
+  Eigen::VectorXd known_gradient_;
+  std::vector<Row> rows_;  // by landmark
+  std::vector<Track> tracks_;
+  Eigen::MatrixXd normal_;  // all but the landmarks
+  Eigen::VectorXd gradient_;
+  Eigen::VectorXd solution_;
+  double noise_square_ = 1;  // of what is left, where 1 is as stated
+};
+
+}  // namespace alidade::internal

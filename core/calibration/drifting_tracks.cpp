@@ -1,0 +1,315 @@
+#include "core/calibration/drifting_tracks.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <utility>
+
+#include "core/calibration/drift_fit.h"
+#include "core/model/median.h"
+
+namespace alidade::internal {
+
+namespace {
+
+class DriftFinder {
+ public:
+  static constexpr int kMostControlPoints = 600;  // some minutes
+
+  DriftFinder(AdjustmentData* data, const AdjustmentState& state, Adjustment* adjustment)
+      : fit_(data, state, adjustment), pixel_rad_(1 / state.camera.focal_length) {}
+
+  DriftingTracks find();
+
+ private:
+  using Track = DriftFit::Track;
+
+  static constexpr double kWindow_s = 3;
+  static constexpr double kLeastLife_s = 0.4;  // of a track that shows its rate
+  static constexpr int kLeastObservations = 5;
+  static constexpr std::size_t kLeastGroup = 8;   // tracks
+  static constexpr double kLeastShare = 0.1;      // of a window's tracks
+  static constexpr std::size_t kMostGroups = 4;   // of a window
+  static constexpr double kGate = 13.8;           // 99.9 % of chi-square, two degrees of freedom
+  static constexpr double kUnmodelled_px = 0.05;  // over a track's life, in its place
+  static constexpr double kPerFreeTrack = 6;      // what freeing a track costs, of its two unknowns
+  static constexpr double kSure = 50;             // difference of sums of squares
+  static constexpr double kLeastDrift_px_s = 0.1;  // less is no drift of the picture
+
+  struct Hypothesis {
+    bool holds = false;
+    std::vector<char> at_rest;
+    double cost = std::numeric_limits<double>::infinity();  // with what free tracks cost
+    std::vector<Vector2<double>> rates;
+    std::vector<Matrix2<double>> covariances;
+  };
+  struct Group {
+    Vector2<double> rate = Vector2<double>::Zero();
+    std::vector<std::size_t> tracks;
+  };
+  struct Window {
+    std::vector<std::size_t> tracks;
+    std::vector<Group> groups;  // the largest first
+  };
+
+  [[nodiscard]] Matrix2<double> covariance_of(const Track& track) const {
+    const double life = std::max(1e-3, track.end_s - track.begin_s);
+    const double unmodelled = kUnmodelled_px * pixel_rad_ / life;
+    return track.covariance + unmodelled * unmodelled * Matrix2<double>::Identity();
+  }
+  [[nodiscard]] bool shows_rate(const Track& track) const {
+    return track.observations >= kLeastObservations && track.end_s - track.begin_s >= kLeastLife_s;
+  }
+  void find_windows();
+  void find_groups(Window* window) const;
+  [[nodiscard]] Hypothesis settle(std::vector<char> at_rest);
+  template <class Choose>
+  [[nodiscard]] std::vector<char> chosen(Choose choose) const;
+  [[nodiscard]] bool all_drift(Vector2<double>* rate) const;
+  [[nodiscard]] Group coherent(const Hypothesis& hypothesis) const;
+
+  DriftFit fit_;
+  double pixel_rad_;
+  std::vector<Window> windows_;
+};
+
+void DriftFinder::find_windows() {
+  double begin = std::numeric_limits<double>::infinity();
+  double end = -begin;
+  for (const Track& track : fit_.tracks()) {
+    if (!shows_rate(track)) continue;
+    begin = std::min(begin, track.begin_s);
+    end = std::max(end, track.end_s);
+  }
+  if (!(begin < end)) return;
+  const int count = std::max(1, static_cast<int>(2 * (end - begin) / kWindow_s) - 1);
+  for (int i = 0; i < count; ++i) {
+    const double from = begin + 0.5 * i * kWindow_s;
+    const double to = i + 1 == count ? end : from + kWindow_s;
+    Window window;
+    for (std::size_t l = 0; l < fit_.tracks().size(); ++l) {
+      const Track& track = fit_.tracks()[l];
+      if (shows_rate(track) && track.middle_s >= from && track.middle_s <= to) {
+        window.tracks.push_back(l);
+      }
+    }
+    find_groups(&window);
+    if (!window.groups.empty()) windows_.push_back(std::move(window));
+  }
+}
+
+// The track with the most others at its rate, with these, is a group; then those left, likewise.
+void DriftFinder::find_groups(Window* window) const {
+  std::vector<std::size_t> left = window->tracks;
+  const std::size_t least =
+      std::max(kLeastGroup,
+               static_cast<std::size_t>(kLeastShare * static_cast<double>(window->tracks.size())));
+  const auto agree = [&](std::size_t a, const Vector2<double>& rate, const Matrix2<double>& of) {
+    const Track& track = fit_.tracks()[a];
+    const Vector2<double> apart = track.rate - rate;
+    return apart.dot((covariance_of(track) + of).inverse() * apart) < kGate;
+  };
+  while (left.size() >= least && window->groups.size() < kMostGroups) {
+    std::size_t best = 0;
+    std::size_t most = 0;
+    for (const std::size_t a : left) {
+      const Matrix2<double> covariance = covariance_of(fit_.tracks()[a]);
+      std::size_t count = 0;
+      for (const std::size_t b : left) {
+        count += agree(b, fit_.tracks()[a].rate, covariance) ? 1U : 0U;
+      }
+      // A track that knows its rate badly agrees with all.
+      if (count <= most) continue;
+      most = count;
+      best = a;
+    }
+    Group group;
+    group.rate = fit_.tracks()[best].rate;
+    Matrix2<double> covariance = covariance_of(fit_.tracks()[best]);
+    for (int round = 0; round < 3; ++round) {
+      group.tracks.clear();
+      Matrix2<double> information = Matrix2<double>::Zero();
+      Vector2<double> sum = Vector2<double>::Zero();
+      for (const std::size_t l : left) {
+        if (!agree(l, group.rate, covariance)) continue;
+        group.tracks.push_back(l);
+        const Matrix2<double> own = covariance_of(fit_.tracks()[l]).inverse();
+        information += own;
+        sum += own * fit_.tracks()[l].rate;
+      }
+      if (group.tracks.empty()) break;
+      covariance = information.inverse();
+      group.rate = covariance * sum;
+    }
+    if (group.tracks.size() < least) break;
+    left.erase(std::remove_if(left.begin(), left.end(),
+                              [&](std::size_t l) {
+                                return std::binary_search(group.tracks.begin(), group.tracks.end(),
+                                                          l);
+                              }),
+               left.end());
+    window->groups.push_back(std::move(group));
+  }
+}
+
+template <class Choose>
+std::vector<char> DriftFinder::chosen(Choose choose) const {
+  std::vector<char> at_rest(fit_.tracks().size(), 0);
+  for (const Window& window : windows_) {
+    for (const std::size_t l : window.groups[choose(window)].tracks) at_rest[l] = 1;
+  }
+  return at_rest;
+}
+
+// What is at rest with the others is at rest; until that stays.
+DriftFinder::Hypothesis DriftFinder::settle(std::vector<char> at_rest) {
+  constexpr int kRounds = 6;
+  Hypothesis out;
+  for (int round = 0; round < kRounds; ++round) {
+    double cost = 0;
+    if (!fit_.solve(at_rest, &cost)) return {};
+    out.at_rest = at_rest;
+    out.cost = cost;
+    out.rates.clear();
+    out.covariances.clear();
+    int rest = 0;
+    bool changed = false;
+    for (std::size_t l = 0; l < at_rest.size(); ++l) {
+      const Track& track = fit_.tracks()[l];
+      const Matrix2<double> covariance = covariance_of(track);
+      out.rates.push_back(track.rate);
+      out.covariances.push_back(covariance);
+      const bool rests = track.observations < kLeastObservations ||
+                         track.rate.dot(covariance.inverse() * track.rate) < kGate;
+      out.cost += at_rest[l] != 0 ? 0 : kPerFreeTrack;
+      rest += rests ? 1 : 0;
+      changed = changed || rests != (at_rest[l] != 0);
+      at_rest[l] = rests ? 1 : 0;
+    }
+    if (rest < static_cast<int>(kLeastGroup)) return {};
+    if (!changed) break;
+  }
+  out.holds = true;
+  return out;
+}
+
+// The most tracks of one rate among those that are not at rest.
+DriftFinder::Group DriftFinder::coherent(const Hypothesis& hypothesis) const {
+  std::vector<std::size_t> moving;
+  for (std::size_t l = 0; l < fit_.tracks().size(); ++l) {
+    if (hypothesis.at_rest[l] == 0 && shows_rate(fit_.tracks()[l])) moving.push_back(l);
+  }
+  Group group;
+  if (moving.size() < kLeastGroup) return group;
+  std::vector<double> pan;
+  std::vector<double> tilt;
+  for (const std::size_t l : moving) {
+    pan.push_back(hypothesis.rates[l].x());
+    tilt.push_back(hypothesis.rates[l].y());
+  }
+  group.rate = {median(pan), median(tilt)};
+  const double slack = 0.2 * group.rate.norm();
+  for (const std::size_t l : moving) {
+    const Vector2<double> apart = hypothesis.rates[l] - group.rate;
+    const Matrix2<double> covariance =
+        hypothesis.covariances[l] + slack * slack * Matrix2<double>::Identity();
+    if (apart.dot(covariance.inverse() * apart) < kGate) group.tracks.push_back(l);
+  }
+  return group;
+}
+
+// A drift of all is steady, and goes beyond what it scatters by from time to time.
+bool DriftFinder::all_drift(Vector2<double>* rate) const {
+  constexpr std::size_t kLeastWindows = 4;
+  constexpr double kMuch = 6;
+  std::vector<Vector2<double>> rates;
+  for (const Window& window : windows_) {
+    if (2 * window.groups.front().tracks.size() > window.tracks.size()) {
+      rates.push_back(window.groups.front().rate);
+    }
+  }
+  if (rates.size() < kLeastWindows) return false;
+  const auto count = static_cast<double>(rates.size());
+  Vector2<double> mean = Vector2<double>::Zero();
+  for (const auto& r : rates) mean += r / count;
+  double square = 0;
+  for (const auto& r : rates) square += (r - mean).squaredNorm() / (count - 1);
+  *rate = mean;
+  // Windows overlap by half.
+  return mean.norm() > 5 * kLeastDrift_px_s * pixel_rad_ &&
+         mean.norm() > kMuch * std::sqrt(2 * square / count);
+}
+
+DriftingTracks DriftFinder::find() {
+  DriftingTracks out;
+  out.drifts.assign(fit_.tracks().size(), 0);
+  double cost = 0;
+  if (!fit_.solve(out.drifts, &cost)) return out;
+  find_windows();
+  if (windows_.empty()) return out;
+  const bool split = std::any_of(windows_.begin(), windows_.end(),
+                                 [](const Window& w) { return w.groups.size() > 1; });
+  const auto largest = [](const Window&) { return std::size_t{0}; };
+  const auto second = [](const Window& w) { return w.groups.size() > 1 ? 1U : std::size_t{0}; };
+  const auto slowest = [](const Window& w) {
+    std::size_t best = 0;
+    for (std::size_t g = 1; g < w.groups.size(); ++g) {
+      if (w.groups[g].rate.norm() < w.groups[best].rate.norm()) best = g;
+    }
+    return best;
+  };
+  if (!split) {
+    if (all_drift(&out.rate)) out.finding = DriftFinding::kAll;
+    return out;
+  }
+  Hypothesis best;
+  for (const auto& start : {chosen(largest), chosen(second), chosen(slowest)}) {
+    Hypothesis hypothesis = settle(start);
+    if (hypothesis.holds && hypothesis.cost < best.cost) best = std::move(hypothesis);
+  }
+  if (!best.holds) return out;
+  const Group group = coherent(best);
+  std::size_t shown = 0;
+  std::size_t moving = 0;
+  for (std::size_t l = 0; l < fit_.tracks().size(); ++l) {
+    if (!shows_rate(fit_.tracks()[l])) continue;
+    ++shown;
+    moving += best.at_rest[l] == 0 ? 1 : 0;
+  }
+  const bool is_group =
+      group.tracks.size() >= kLeastGroup && 2 * group.tracks.size() > moving &&
+      static_cast<double>(group.tracks.size()) > kLeastShare * static_cast<double>(shown) &&
+      group.rate.norm() > kLeastDrift_px_s * pixel_rad_;
+  if (!is_group) return out;
+  // Would the group be at rest?
+  std::vector<char> other(fit_.tracks().size(), 0);
+  for (const std::size_t l : group.tracks) other[l] = 1;
+  const Hypothesis against = settle(std::move(other));
+  out.rate = group.rate;
+  if (against.holds && against.at_rest != best.at_rest && against.cost - best.cost < kSure) {
+    out.finding = DriftFinding::kUndecided;
+    return out;
+  }
+  out.finding = DriftFinding::kGroup;
+  for (std::size_t l = 0; l < fit_.tracks().size(); ++l) {
+    out.drifts[l] = best.at_rest[l] == 0 ? 1 : 0;
+    out.count += out.drifts[l];
+  }
+  return out;
+}
+
+}  // namespace
+
+DriftingTracks find_drifting_tracks(AdjustmentData* data, const AdjustmentState& state,
+                                    Adjustment* adjustment) {
+  if (state.trajectory.control_points() > DriftFinder::kMostControlPoints) {
+    DriftingTracks none;
+    none.drifts.assign(state.landmarks.size(), 0);
+    return none;
+  }
+  return DriftFinder(data, state, adjustment).find();
+}
+
+}  // namespace alidade::internal

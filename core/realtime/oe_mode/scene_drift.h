@@ -1,0 +1,151 @@
+#pragma once
+// SceneDrift: does what the map's landmarks show stand still? Telemetry says over seconds what
+// ground is. Each landmark has a rate in the map's frame, from its places over some seconds, and
+// the map has one against telemetry, from its offsets. Rates are (pan, tilt) by which the camera
+// would have to turn for the same change in the picture, rad/s; landmark and map together are zero
+// for ground. Landmarks fall into one group, or into two of one rate each: clouds before a
+// mountain. Of two, telemetry says which is at rest; as long as it does not, nothing is claimed.
+// A group alone that is not at rest moves, if it does so steadily: play and sway are not steady, and
+// what goes with the angle is the gear's. Then a new map has to prove itself.
+// The constructor takes all memory; nothing else allocates, waits or throws. One thread.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "core/model/linear_algebra.h"
+#include "core/realtime/oe_mode/orientation_solve.h"
+
+namespace alidade {
+
+enum class SceneVerdict {
+  kRest,       // as far as can be seen
+  kUndecided,  // of two groups either may be at rest
+  kPartMoves,  // those landmarks that are apart
+  kMapMoves,   // the others, which the map follows
+  kAllMove
+};
+
+// Telemetry's angle minus the map's, at one time.
+struct SeenOffset {
+  double time_s = 0;
+  Vector2<double> angle = Vector2<double>::Zero();     // rad, (pan, tilt)
+  Vector2<double> offset = Vector2<double>::Zero();    // rad
+  Vector2<double> variance = Vector2<double>::Zero();  // rad^2, of its noise
+  // Standard deviation of d offset / d angle, by an error that goes with the angle.
+  Vector2<double> slope_sigma = Vector2<double>::Zero();
+};
+
+class SceneDrift {
+ public:
+  // capacity: of the map.
+  explicit SceneDrift(int capacity) : records_(static_cast<std::size_t>(capacity)) {}
+
+  // For another calibration.
+  void reset();
+  // The map begins anew.
+  void begin_map();
+
+  void note(const SeenOffset& seen);
+  // Begins a frame in which landmarks held. rate: rad/s, the camera's.
+  void begin_frame(double time_s, const Vector2<double>& rate);
+  // d: unit, where it was found, in the map's frame. matched: share of looks in which the landmark
+  // agreed with the map.
+  void note_landmark(int slot, std::uint32_t id, const Vector3<double>& d, double matched);
+  // Of that frame. pixel: rad.
+  SceneVerdict judge(double pixel);
+
+  // By the latest verdict. A withheld answer is telemetry's.
+  [[nodiscard]] bool withholds() const { return on_trial_ || verdict_ == SceneVerdict::kUndecided; }
+  // A new map has to prove itself, as what was in view before moved.
+  [[nodiscard]] bool is_on_trial() const { return on_trial_; }
+  // rad^2, of (pan, tilt): by how much the map may have drifted along without anything being
+  // shown yet.
+  [[nodiscard]] const Matrix2<double>& doubt() const { return doubt_; }
+
+  // The frame's landmarks that move, by the latest verdict: calls use(slot, id, d, rate).
+  template <class Use>
+  void for_each_moving(Use use) const {
+    for (std::size_t i = 0; i < noted_count_; ++i) {
+      const Noted& n = noted_[i];
+      const bool moves = verdict_ == SceneVerdict::kAllMove ||
+                         (verdict_ == SceneVerdict::kPartMoves && n.apart) ||
+                         (verdict_ == SceneVerdict::kMapMoves && n.tested && !n.apart);
+      if (moves) use(n.slot, n.id, n.d, n.apart ? apart_rate_ : rate_);
+    }
+  }
+  // What moves had its part in the map.
+  [[nodiscard]] bool has_bent_map() const { return bent_; }
+
+  [[nodiscard]] std::size_t memory_bytes() const { return records_.capacity() * sizeof(Record); }
+
+ private:
+  // Sums for a straight line through what was seen, older values count less.
+  struct Record {
+    std::uint32_t id = 0;
+    Vector2<double> first = Vector2<double>::Zero();  // rad, azimuth and elevation
+    double first_s = 0;
+    double last_s = 0;
+    double weight = 0;
+    double t = 0;
+    double tt = 0;
+    Vector2<double> y = Vector2<double>::Zero();
+    Vector2<double> ty = Vector2<double>::Zero();
+    Vector2<double> yy = Vector2<double>::Zero();
+  };
+  struct Noted {
+    int slot = 0;
+    std::uint32_t id = 0;
+    Vector3<double> d = Vector3<double>::Zero();
+    double matched = 0;
+    bool tested = false;
+    bool apart = false;
+    Vector2<double> rate = Vector2<double>::Zero();
+    double variance = 0;
+    double life_s = 0;
+  };
+  // Of one axis: offset = a + rate t + slope angle.
+  struct OffsetLine {
+    Matrix3<double> normal = Matrix3<double>::Zero();
+    Vector3<double> gradient = Vector3<double>::Zero();
+    double square = 0;
+    double weight = 0;  // count
+  };
+  struct Rate {
+    Vector2<double> value = Vector2<double>::Zero();
+    Vector2<double> variance = Vector2<double>::Zero();
+    double misfit = 0;  // mean square of what is left, 1: its noise
+  };
+
+  [[nodiscard]] bool map_rate(const Vector2<double>& slope_sigma, double pixel, Rate* out) const;
+  void find_rates(double pixel);
+  [[nodiscard]] bool find_groups(double pixel);
+  [[nodiscard]] Vector2<double> median_rate(bool apart);
+  SceneVerdict judge_two(double pixel);
+  SceneVerdict judge_one(double pixel);
+
+  std::vector<Record> records_;  // by slot
+  std::array<Noted, kMaxFoundLandmarks> noted_{};
+  std::size_t noted_count_ = 0;
+  std::array<double, kMaxFoundLandmarks> sorted_{};
+  std::array<OffsetLine, 2> lines_;
+  Vector2<double> slope_sigma_ = Vector2<double>::Zero();
+  double begun_s_ = 0;  // of the offsets
+  Vector2<double> begun_angle_ = Vector2<double>::Zero();
+  double noted_s_ = 0;
+  bool has_offsets_ = false;
+  double time_s_ = 0;  // of the frame
+  double mean_square_rate_ = 0;
+  SceneVerdict verdict_ = SceneVerdict::kRest;
+  Vector2<double> rate_ = Vector2<double>::Zero();  // against telemetry
+  Vector2<double> apart_rate_ = Vector2<double>::Zero();
+  Vector2<double> group_ = Vector2<double>::Zero();  // in the map's frame
+  Vector2<double> apart_group_ = Vector2<double>::Zero();
+  Matrix2<double> doubt_ = Matrix2<double>::Zero();
+  bool bent_ = false;
+  bool on_trial_ = false;
+  Vector2<double> moved_rate_ = Vector2<double>::Zero();  // of what moved last
+};
+
+}  // namespace alidade
