@@ -1,7 +1,8 @@
 #pragma once
 // AngleStep: finds the step of which all readings of a head are multiples, so that nobody has to
 // state it. Euclid's algorithm on the differences of successive readings: those of a continuous
-// angle soon have no common measure left. Plain values; no allocation. One thread.
+// angle soon have no common measure left. A head that turns evenly has equal differences without
+// any step, so only changes of the difference count. Plain values; no allocation. One thread.
 
 #include <algorithm>
 #include <cmath>
@@ -26,15 +27,17 @@ class AngleStep {
     void add(double angle) {
       if (!std::isfinite(angle)) return;
       const double moved = begun_ ? std::abs(wrap_angle(angle - angle_)) : 0;
+      const double changed = std::abs(moved - moved_);
       begun_ = true;
       angle_ = angle;
+      moved_ = moved;
       if (continuous_ || moved < kSmallest_rad) return;
       if (measure_ == 0) measure_ = moved;
       const double multiple = moved / measure_;
       const double rest = std::abs(multiple - std::round(multiple)) * measure_;
       if (multiple > kMostMultiple) return;  // says nothing of so small a measure
       if (rest < kExact * measure_) {
-        ++agreed_;
+        if (changed > 0.5 * measure_) ++agreed_;
         return;
       }
       agreed_ = 0;
@@ -48,11 +51,12 @@ class AngleStep {
     static constexpr double kSmallest_rad = 2e-7;
     static constexpr double kExact = 0.02;  // of the measure
     static constexpr double kMostMultiple = 1e4;
-    static constexpr int kEnough = 20;  // differences; by chance each agrees once in 25
+    static constexpr int kEnough = 6;  // differences; by chance each agrees once in 25
 
     bool begun_ = false;
     bool continuous_ = false;
     double angle_ = 0;
+    double moved_ = 0;  // rad, to angle_
     double measure_ = 0;
     int agreed_ = 0;
   };

@@ -38,6 +38,28 @@ TEST(AngleStep, FindsNoneInAContinuousAngle) {
   }
 }
 
+// Its differences are equal up to noise.
+TEST(AngleStep, FindsNoneInAnEvenTurn) {
+  std::mt19937_64 random(2);
+  std::normal_distribution<double> noise(0, 3e-6);
+  for (const double rate : {1e-3, 3e-3, 1e-2}) {  // rad a sample
+    AngleStep found;
+    for (int i = 0; i < 300; ++i) {
+      found.add(wrap_angle(rate * i + noise(random)), 0.1);
+      ASSERT_EQ(found.step(), 0) << rate << " " << i;
+    }
+  }
+}
+
+// A second before the first picture is enough at 20 Hz.
+TEST(AngleStep, IsFoundWithinASecond) {
+  constexpr double kStep = 2.35e-4;
+  AngleStep found;
+  for (int i = 0; i < 20; ++i)
+    found.add(in_steps(-0.04 + 1.83e-3 * i, kStep), in_steps(-0.006 - 1.3e-3 * i, kStep));
+  EXPECT_NEAR(found.step(), kStep, 0.01 * kStep);
+}
+
 TEST(AngleStep, KnowsNothingOfAHeadThatRestsOrOfNone) {
   AngleStep found;
   EXPECT_EQ(found.step(), 0);
@@ -51,7 +73,7 @@ TEST(AngleStep, GoesTheShortWayRound) {
   constexpr double kStep = 2 * kPi / 36000;
   AngleStep found;
   for (int i = 0; i < 100; ++i) {
-    found.add(wrap_angle(kPi - 50 * kStep + i * kStep), 0);
+    found.add(wrap_angle(kPi - 50 * kStep + (i + i / 3) * kStep), 0);
   }
   EXPECT_NEAR(found.step(), kStep, 1e-9);
 }
