@@ -5,6 +5,7 @@
 #include <string>
 
 #include "core/calibration/adjustment.h"
+#include "core/calibration/centre_share.h"
 #include "core/calibration/input_selection.h"
 #include "core/calibration/stage_status.h"
 #include "core/calibration/start_values.h"
@@ -39,6 +40,7 @@ class StagedAdjustment {
   // where residuals move the parameters together (shared_errors.h), and where parts of the
   // recording contradict each other (contradictions.h). A robust loss on good data would inflate
   // the sigmas. Sets the quality's steps, ratios, repetition and contradiction.
+  // All that makes the covariance grow does so with the optical centre held (centre_share.h).
   [[nodiscard]] StageStatus adjust_on_inliers(CalibrationQuality* quality);
 
   [[nodiscard]] const Adjusted& adjusted() const { return adjusted_; }
@@ -52,6 +54,8 @@ class StagedAdjustment {
   void replace_rounded_telemetry();
   bool mark_outliers();
   bool correct_noise(CalibrationQuality* quality);
+  [[nodiscard]] bool hold_centre();
+  void release_centre();
   [[nodiscard]] StageStatus allow_for_repetition(CalibrationQuality* quality);
   void allow_for_shared_errors();
   void allow_for_contradictions(CalibrationQuality* quality);
@@ -59,6 +63,7 @@ class StagedAdjustment {
   SelectedInput* selected_;
   TelemetryAngleNoise noise_;
   int max_knots_;
+  double centre_sigma_px_;  // prior
   std::string doubt_;
   Adjustment adjustment_;
   TelemetryDepartures departures_;
@@ -66,6 +71,8 @@ class StagedAdjustment {
   Adjusted adjusted_;
   AdjustmentState start_;
   double telemetry_unknowns_ = 0;
+  CentreShare<kGlobalCount> centre_;
+  GlobalMatrix centre_held_ = GlobalMatrix::Zero();  // covariance before it grew
   bool settled_ = false;  // by settle_robustly()
 };
 
