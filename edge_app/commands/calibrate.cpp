@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/calibration/zoom_fit.h"
 #include "edge_app/commands/calibrate.h"
 #include "edge_app/commands/calibrate_zooms.h"
 #include "edge_app/commands/calibration_input.h"
@@ -57,7 +58,7 @@ void set_prior(const char* option, const std::string& text, const char* unit,
   *prior = read;
 }
 
-void set_priors(const CalibrateOptions& options, CalibrationOptions* calibration) {
+void set_priors(const CalibrateOptions& options, int width, CalibrationOptions* calibration) {
   set_prior("--focal-length", options.focal_length, "px", &calibration->focal_length);
   set_prior("--aspect", options.aspect, "f_v / f_u", &calibration->aspect);
   static_assert(kDistortionCount == 1, "an option for each term");
@@ -68,6 +69,7 @@ void set_priors(const CalibrateOptions& options, CalibrationOptions* calibration
     calibration->pan_scale.sigma = *options.scale_sigma;
     calibration->tilt_scale.sigma = *options.scale_sigma;
   }
+  calibration->centre_sigma_px = options.centre_sigma_px.value_or(kUsualCentreShare * width);
   std::string error;
   if (!calibration->validate(&error)) throw CommandError(kExitUsage, error);
 }
@@ -94,7 +96,7 @@ std::vector<CalibrationJob> load_jobs(const CalibrateOptions& options) {
   std::vector<CalibrationJob> jobs;
   for (const std::string& recording : options.recordings) {
     for (CalibrationJob& job : load_calibration_jobs(recording, options.zoom_tolerance)) {
-      set_priors(options, &job.options);
+      set_priors(options, job.input.width, &job.options);
       set_lens_prior(options, &job);
       jobs.push_back(std::move(job));
     }

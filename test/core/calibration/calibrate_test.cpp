@@ -4,9 +4,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdio>
 #include <limits>
 #include <random>
 
+#include "core/model/direction.h"
+#include "core/model/rolling_shutter.h"
 #include "test/support/simulated_recording.h"
 
 namespace alidade {
@@ -239,6 +242,69 @@ TEST(Calibrate, EstimatesTheAspectWhenAsked) {
   CalibrationOptions options;
   options.aspect = std::nullopt;
   expect_within_sigmas(s, calibrate(simulate(s), options));
+}
+
+// Covariance (rad^2) of where a pixel looks at true angles.
+Matrix2<double> direction_covariance(const Calibration& c, const Vector2<double>& u,
+                                     const Eigen::Vector2d& angle) {
+  Vector3<double> d;
+  Matrix<double, 3, kParameterCount> J;
+  EXPECT_EQ(rolling_shutter_unproject(c.camera, c.mechanics, c.line_delay,
+                                      {{angle[0], angle[1]}, {0, 0}, 0.0}, u, &d, nullptr, nullptr,
+                                      &J),
+            ProjectionStatus::kOk);
+  const Sensitivity<2> to_tangent = tangent_basis(d).transpose() * J;
+  return to_tangent * c.covariance * to_tangent.transpose();
+}
+
+TEST(Calibrate, AFreeCentreHardlyWidensDirections) {
+  for (const double f : {1500.0, 4000.0, 30000.0}) {
+    Simulation s = small_simulation(31);
+    s.focal_length = f;
+    s.radial_distortion = 0.05 * f * f / (1100.0 * 1100.0);
+    const CalibrationInput input = simulate(s);
+    const CalibrationResult exact = calibrate(input);
+    CalibrationOptions options;
+    options.centre_sigma_px = 19;
+    const CalibrationResult open = calibrate(input, options);
+    SCOPED_TRACE(f);
+    expect_within_sigmas(s, open);
+    ASSERT_TRUE(exact.ok()) << exact.message;
+    EXPECT_GT(open.calibration.covariance(index(Parameter::kPanAxis0), index(Parameter::kPanAxis0)),
+              exact.calibration.covariance(index(Parameter::kPanAxis0), index(Parameter::kPanAxis0)));
+    double most = 0;
+    double sum = 0;
+    int compared = 0;
+    for (const double u : {300.0, 960.0, 1620.0}) {
+      for (const double v : {200.0, 540.0, 880.0}) {
+        for (const double t : {0.0, 1.5, 3.0, 4.5, 6.0, 7.5}) {
+          const double with =
+              direction_covariance(open.calibration, {u, v}, s.angles(t)).trace();
+          const double without =
+              direction_covariance(exact.calibration, {u, v}, s.angles(t)).trace();
+          most = std::max(most, std::sqrt(with / without));
+          sum += std::sqrt(with / without);
+          ++compared;
+        }
+      }
+    }
+    EXPECT_LT(sum / compared, 1.1);
+    RecordProperty("most", std::to_string(most));
+    std::printf("f %g: mean %.3f most %.3f\n", f, sum / compared, most);
+  }
+}
+
+TEST(Calibrate, FindsAFreeCentreWithinItsSigmas) {
+  for (const double f : {1500.0, 4000.0, 30000.0}) {
+    Simulation s = small_simulation(32);
+    s.focal_length = f;
+    s.radial_distortion = -0.05 * f * f / (1100.0 * 1100.0);
+    s.optical_centre_offset_px = {22, -14};
+    CalibrationOptions options;
+    options.centre_sigma_px = 19;
+    SCOPED_TRACE(f);
+    expect_within_sigmas(s, calibrate(simulate(s), options));
+  }
 }
 
 TEST(CalibrationOptions, TellOfEachParameterHowWellItIsKnownBefore) {

@@ -1,0 +1,92 @@
+// The optical centre's part of a covariance, on random ones and on one that is nearly singular.
+
+#include "core/calibration/centre_share.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "core/model/calibration.h"
+
+namespace alidade::internal {
+namespace {
+
+constexpr int kCentre = camera_column::kCentreU;
+using Covariance = ParameterCovariance<double>;
+
+Covariance random_covariance(int seed) {
+  std::mt19937 random(static_cast<unsigned>(seed));
+  std::normal_distribution<double> normal;
+  Covariance root;
+  for (int i = 0; i < kParameterCount; ++i) {
+    for (int j = 0; j < kParameterCount; ++j) root(i, j) = normal(random);
+  }
+  return root * root.transpose();
+}
+
+TEST(CentreShare, IsWhatTheCovarianceLosesWithTheCentreHeld) {
+  for (int seed = 1; seed <= 20; ++seed) {
+    const Covariance C = random_covariance(seed);
+    const auto share = centre_share<kParameterCount>(C);
+    ASSERT_TRUE(share.exists());
+    const Covariance held = with_centre_held(C, share);
+    EXPECT_LT((held + share.part() - C).norm(), 1e-9 * C.norm()) << seed;
+    // The inverse of what the information says of the others.
+    const Covariance information = C.inverse();
+    Eigen::MatrixXd others(kParameterCount - 2, kParameterCount - 2);
+    Eigen::MatrixXd held_others = others;
+    const auto place = [](int i) { return i < kCentre ? i : i + 2; };
+    for (int i = 0; i < kParameterCount - 2; ++i) {
+      for (int j = 0; j < kParameterCount - 2; ++j) {
+        others(i, j) = information(place(i), place(j));
+        held_others(i, j) = held(place(i), place(j));
+      }
+    }
+    EXPECT_LT((others * held_others - Eigen::MatrixXd::Identity(others.rows(), others.rows())).norm(),
+              1e-5)
+        << seed;
+    EXPECT_EQ(held.row(kCentre).norm(), 0);
+  }
+}
+
+TEST(CentreShare, SurvivesAxesThatFollowTheCentreAlmostEntirely) {
+  constexpr double kF = 10670;
+  constexpr double kCentreSigma = 6.4;
+  constexpr double kOwnSigma = 1e-6;  // rad
+  Covariance C = Covariance::Zero();
+  const int axis = index(Parameter::kPanAxis0);
+  C(kCentre, kCentre) = C(kCentre + 1, kCentre + 1) = kCentreSigma * kCentreSigma;
+  C(axis, axis) = std::pow(kCentreSigma / kF, 2) + kOwnSigma * kOwnSigma;
+  C(axis, kCentre) = C(kCentre, axis) = kCentreSigma * kCentreSigma / kF;
+  const Covariance held = with_centre_held(C, centre_share<kParameterCount>(C));
+  EXPECT_NEAR(std::sqrt(held(axis, axis)), kOwnSigma, 1e-6 * kOwnSigma);
+}
+
+TEST(CentreShare, OfAnExactCentreIsNothing) {
+  Covariance C = random_covariance(5);
+  C.middleRows<2>(kCentre).setZero();
+  C.middleCols<2>(kCentre).setZero();
+  const auto share = centre_share<kParameterCount>(C);
+  EXPECT_FALSE(share.exists());
+  EXPECT_EQ(with_centre_held(C, share), C);
+  EXPECT_EQ(share.part().norm(), 0);
+}
+
+TEST(CentreShare, GrowsByWhatTheDataSayOnly) {
+  constexpr double kPrior = 6.4;
+  Matrix2<double> data;  // information
+  data << 4, 1, 1, 9;
+  Matrix2<double> information = data;
+  information.diagonal().array() += 1 / (kPrior * kPrior);
+  const Matrix2<double> V = information.inverse();
+  EXPECT_LT((grown_centre(V, kPrior, 1) - V).norm(), 1e-12);
+  EXPECT_LT((grown_centre(V, kPrior, 0.5) - V).norm(), 1e-12);
+  Matrix2<double> quarter = data / 4;
+  quarter.diagonal().array() += 1 / (kPrior * kPrior);
+  EXPECT_LT((grown_centre(V, kPrior, 4) - quarter.inverse()).norm(), 1e-9);
+  EXPECT_NEAR(std::sqrt(grown_centre(V, kPrior, 1e9)(0, 0)), kPrior, 1e-6);
+}
+
+}  // namespace
+}  // namespace alidade::internal
