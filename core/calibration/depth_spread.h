@@ -4,7 +4,7 @@
 //   u moves by a share rho o of its place from the middle,  rho inverse distance, o pupil (m)
 // Landmarks have errors of their own for other reasons, too. So what they show along the radius is
 // held against what they show across it, which no depth explains. What all rho o have in common is
-// a focal length and shows nowhere: it is taken to be as large as their spread.
+// a focal length and shows nowhere.
 // Derivation: docs/calibration.md. Allocates.
 
 #include "core/calibration/adjustment.h"

@@ -152,6 +152,20 @@ TEST_F(CalibrateCommand, StatesAndUsesThePriorsOfItsOptions) {
   EXPECT_EQ(priors["pan_scale"]["sigma"], 0.001);
 }
 
+TEST_F(CalibrateCommand, LeavesTheOpticalCentreFreeUnlessItIsStatedExact) {
+  test::Simulation simulation;
+  simulation.optical_centre_offset_px = {12, -9};
+  record(simulation);
+  ASSERT_EQ(calibrate_command({path()}).exit_code, 0);
+  Calibration calibration = stored();
+  expect_near_truth(calibration, simulation_);
+  const double sigma = parameter_sigma(calibration, Parameter::kCentreU);
+  EXPECT_GT(sigma, 0);
+  EXPECT_LE(sigma, 0.01 * simulation.width);
+  ASSERT_EQ(calibrate_command({path(), "--centre-sigma", "0"}).exit_code, 0);
+  EXPECT_FALSE(stored().has_centre());
+}
+
 // The lens.yaml of the simulated camera, for images of this size.
 std::string lens_file_of(const test::Simulation& simulation, int width, int height,
                          double line_delay_sigma) {
@@ -465,6 +479,7 @@ TEST_F(CalibrateCommand, BadOptionsAreOneLineAndExitCodeTwo) {
                                                     {path(), "--focal-length", "-4000"},
                                                     {path(), "--line-delay", "nan"},
                                                     {path(), "--scale-sigma", "2"},
+                                                    {path(), "--centre-sigma", "-1"},
                                                     {path("none")}}) {
     const Result result = calibrate_command(arguments);
     EXPECT_EQ(result.exit_code, 2) << ::testing::PrintToString(arguments);
