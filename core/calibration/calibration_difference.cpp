@@ -31,8 +31,10 @@ Eigen::Matrix<double, kParameterCount, 1> difference(const Calibration& a, const
 }  // namespace
 
 double difference_chi_square(const Calibration& a, const Calibration& b, bool with_clock_offset) {
-  const internal::CentreShare<kParameterCount> of_a = internal::centre_share<kParameterCount>(a.covariance);
-  const internal::CentreShare<kParameterCount> of_b = internal::centre_share<kParameterCount>(b.covariance);
+  const internal::CentreShare<kParameterCount> of_a =
+      internal::centre_share<kParameterCount>(a.covariance);
+  const internal::CentreShare<kParameterCount> of_b =
+      internal::centre_share<kParameterCount>(b.covariance);
   Eigen::Matrix<double, kParameterCount, 1> d = difference(a, b);
   // What b would be with the centre of a.
   if (of_a.exists() && of_b.exists())

@@ -73,7 +73,7 @@ class StagedAdjustment {
   double telemetry_unknowns_ = 0;
   CentreShare<kGlobalCount> centre_;
   GlobalMatrix centre_held_ = GlobalMatrix::Zero();  // covariance before it grew
-  bool settled_ = false;  // by settle_robustly()
+  bool settled_ = false;                             // by settle_robustly()
 };
 
 }  // namespace alidade::internal

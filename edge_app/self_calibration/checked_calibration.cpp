@@ -132,8 +132,7 @@ CheckedCalibration calibrate_session(const CalibrationSession& session,
   // result instead.
   const double common_s = std::exchange(input.noise.telemetry_common_sigma_s, 0.0);
   CentreShare<kParameterCount> centre;
-  if (known != nullptr)
-    centre = set_priors(*known, options.prior_inflation, common_s, &adjustment);
+  if (known != nullptr) centre = set_priors(*known, options.prior_inflation, common_s, &adjustment);
   input.observations = choose_tracks(session.observations(), options.max_observations);
   const std::vector<CalibrationObservation> held_out = take_held_out(stamps, &input.observations);
 

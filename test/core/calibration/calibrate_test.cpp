@@ -249,10 +249,10 @@ Matrix2<double> direction_covariance(const Calibration& c, const Vector2<double>
                                      const Eigen::Vector2d& angle) {
   Vector3<double> d;
   Matrix<double, 3, kParameterCount> J;
-  EXPECT_EQ(rolling_shutter_unproject(c.camera, c.mechanics, c.line_delay,
-                                      {{angle[0], angle[1]}, {0, 0}, 0.0}, u, &d, nullptr, nullptr,
-                                      &J),
-            ProjectionStatus::kOk);
+  EXPECT_EQ(
+      rolling_shutter_unproject(c.camera, c.mechanics, c.line_delay,
+                                {{angle[0], angle[1]}, {0, 0}, 0.0}, u, &d, nullptr, nullptr, &J),
+      ProjectionStatus::kOk);
   const Sensitivity<2> to_tangent = tangent_basis(d).transpose() * J;
   return to_tangent * c.covariance * to_tangent.transpose();
 }
@@ -270,16 +270,16 @@ TEST(Calibrate, AFreeCentreHardlyWidensDirections) {
     SCOPED_TRACE(f);
     expect_within_sigmas(s, open);
     ASSERT_TRUE(exact.ok()) << exact.message;
-    EXPECT_GT(open.calibration.covariance(index(Parameter::kPanAxis0), index(Parameter::kPanAxis0)),
-              exact.calibration.covariance(index(Parameter::kPanAxis0), index(Parameter::kPanAxis0)));
+    EXPECT_GT(
+        open.calibration.covariance(index(Parameter::kPanAxis0), index(Parameter::kPanAxis0)),
+        exact.calibration.covariance(index(Parameter::kPanAxis0), index(Parameter::kPanAxis0)));
     double most = 0;
     double sum = 0;
     int compared = 0;
     for (const double u : {300.0, 960.0, 1620.0}) {
       for (const double v : {200.0, 540.0, 880.0}) {
         for (const double t : {0.0, 1.5, 3.0, 4.5, 6.0, 7.5}) {
-          const double with =
-              direction_covariance(open.calibration, {u, v}, s.angles(t)).trace();
+          const double with = direction_covariance(open.calibration, {u, v}, s.angles(t)).trace();
           const double without =
               direction_covariance(exact.calibration, {u, v}, s.angles(t)).trace();
           most = std::max(most, std::sqrt(with / without));

@@ -111,8 +111,7 @@ TEST(CalibrationDifference, AFreeCentreHidesNoMovementOfTheMount) {
   a.covariance += share.part();
   Calibration b = a;
   b.camera.set_centre_offset({15, -20});
-  const Eigen::Matrix<double, kParameterCount, 1> along =
-      share.slope * b.camera.centre_offset();
+  const Eigen::Matrix<double, kParameterCount, 1> along = share.slope * b.camera.centre_offset();
   b = moved(b, along);
   EXPECT_LT(difference_chi_square(a, b), 0.01);
   Eigen::Matrix<double, kParameterCount, 1> d = decltype(d)::Zero();

@@ -43,8 +43,9 @@ TEST(CentreShare, IsWhatTheCovarianceLosesWithTheCentreHeld) {
         held_others(i, j) = held(place(i), place(j));
       }
     }
-    EXPECT_LT((others * held_others - Eigen::MatrixXd::Identity(others.rows(), others.rows())).norm(),
-              1e-5)
+    EXPECT_LT(
+        (others * held_others - Eigen::MatrixXd::Identity(others.rows(), others.rows())).norm(),
+        1e-5)
         << seed;
     EXPECT_EQ(held.row(kCentre).norm(), 0);
   }
