@@ -3,7 +3,6 @@
 #include <Eigen/LU>
 #include <algorithm>
 
-#include "core/calibration/centre_share.h"
 #include "core/model/direction.h"
 
 namespace alidade {
@@ -31,18 +30,7 @@ Eigen::Matrix<double, kParameterCount, 1> difference(const Calibration& a, const
 }  // namespace
 
 double difference_chi_square(const Calibration& a, const Calibration& b, bool with_clock_offset) {
-  const internal::CentreShare<kParameterCount> of_a =
-      internal::centre_share<kParameterCount>(a.covariance);
-  const internal::CentreShare<kParameterCount> of_b =
-      internal::centre_share<kParameterCount>(b.covariance);
-  Eigen::Matrix<double, kParameterCount, 1> d = difference(a, b);
-  // What b would be with the centre of a.
-  if (of_a.exists() && of_b.exists())
-    d -= of_b.slope * Vector2<double>(d.segment<2>(index(Parameter::kCentreU)));
-  const ParameterCovariance<double> cov_a =
-      of_b.exists() ? internal::with_centre_held(a.covariance, of_a) : a.covariance;
-  const ParameterCovariance<double> cov_b =
-      of_a.exists() ? internal::with_centre_held(b.covariance, of_b) : b.covariance;
+  const auto d = difference(a, b);
   ComparedCovariance covariance;
   Compared x;
   for (int i = 0; i < kCount; ++i) {
@@ -50,7 +38,7 @@ double difference_chi_square(const Calibration& a, const Calibration& b, bool wi
     x[i] = d[row];
     for (int j = 0; j < kCount; ++j) {
       const int column = index(kComparedParameters[static_cast<std::size_t>(j)]);
-      covariance(i, j) = cov_a(row, column) + cov_b(row, column);
+      covariance(i, j) = a.covariance(row, column) + b.covariance(row, column);
     }
   }
   if (!with_clock_offset) {
@@ -67,12 +55,8 @@ double difference_chi_square(const Calibration& a, const Calibration& b, bool wi
 }
 
 bool is_sharper(const Calibration& after, const Calibration& before, double share) {
-  const ParameterCovariance<double> of_after = internal::with_centre_held(
-      after.covariance, internal::centre_share<kParameterCount>(after.covariance));
-  const ParameterCovariance<double> of_before = internal::with_centre_held(
-      before.covariance, internal::centre_share<kParameterCount>(before.covariance));
   return std::any_of(kComparedParameters.begin(), kComparedParameters.end(), [&](Parameter p) {
-    return of_after(index(p), index(p)) < share * share * of_before(index(p), index(p));
+    return parameter_sigma(after, p) < share * parameter_sigma(before, p);
   });
 }
 

@@ -4,8 +4,7 @@
 //   d = b - a                               by Parameter; axes in a's tangent basis
 //   chi_square = d^T (cov_a + cov_b)^-1 d   as if the two were independent
 // Compared are focal length, radial distortion, line delay, both axes and the clock offset. Scales
-// and aspect rest on priors that both calibrations share, and are left out. A free optical centre is
-// one and the same for both: what they would be with that of a is compared (centre_share.h).
+// and aspect rest on priors that both calibrations share, and are left out.
 // If both covariances are right, chi_square is chi-square distributed with as many degrees of
 // freedom as parameters are compared (99.9 % of 8 lie below 26). px, rad, s. Pure; fixed memory.
 
@@ -26,8 +25,7 @@ inline constexpr std::array<Parameter, 8> kComparedParameters = {
 [[nodiscard]] double difference_chi_square(const Calibration& a, const Calibration& b,
                                            bool with_clock_offset = true);
 
-// Whether the sigma of any compared parameter, with the centre held, fell below `share` of what it
-// was in `before`.
+// Whether the sigma of any compared parameter fell below `share` of its sigma in `before`.
 [[nodiscard]] bool is_sharper(const Calibration& after, const Calibration& before, double share);
 
 }  // namespace alidade

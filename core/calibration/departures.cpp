@@ -316,7 +316,7 @@ Departures find_departures(const Adjustment& adjustment, const AdjustmentState& 
       N -= tied * (along.transpose() * rows);
     }
   }
-  const DepthSpread spread = depth_spread(adjustment, state, at);
+  const DepthSpread spread = depth_spread(adjustment, state, at, factor);
   if (spread.log_chance < limit) {
     found.causes.insert(spread.log_chance < likeliest ? found.causes.begin() : found.causes.end(),
                         {"different distances", spread.excess, spread.landmarks, 1e3 * spread.sigma,

@@ -13,6 +13,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/calibration/centre_frame.h"
+#include "core/calibration/number_text.h"
 #include "core/calibration/zoom_fit.h"
 #include "edge_app/commands/calibrate.h"
 #include "edge_app/commands/calibrate_zooms.h"
@@ -114,9 +116,21 @@ std::string tracks_text(const std::vector<CalibrationObservation>& observations)
   return text;
 }
 
+// The calibration's file has the centre as exact.
+void say_centre(const std::string& recording, const Calibration& calibration) {
+  const double sigma_u = parameter_sigma(calibration, Parameter::kCentreU);
+  const double sigma_v = parameter_sigma(calibration, Parameter::kCentreV);
+  if (!(sigma_u > 0) || !(sigma_v > 0)) return;
+  spdlog::info("{}: optical centre right and down of the picture's middle: {}, {}", recording,
+               estimate_text(calibration.camera.centre_u, sigma_u, "px"),
+               estimate_text(calibration.camera.centre_v, sigma_v, "px"));
+}
+
 int calibrate_one(const CalibrateOptions& options, CalibrationJob job, StopSignals* signals) {
   const std::string& recording = job.recording;
-  const CalibrationResult result = calibrate_job(options.passes, &job, signals);
+  CalibrationResult result = calibrate_job(options.passes, &job, signals);
+  say_centre(recording, result.calibration);
+  result.calibration = with_frame_through_centre(result.calibration);
   for (const std::string& remark : job.remarks) spdlog::warn("{}: {}", recording, remark);
   // Without a solution there is nothing to plot.
   if (result.frames.empty()) {

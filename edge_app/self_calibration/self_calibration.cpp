@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/calibration/calibration_difference.h"
+#include "core/calibration/centre_frame.h"
 #include "core/calibration/number_text.h"
 #include "core/calibration/zoom_fit.h"
 #include "edge_app/self_calibration/calibration_refusal.h"
@@ -144,7 +145,13 @@ CheckedCalibration SelfCalibration::adjust(const Calibration* known, bool free_c
   options.width = options_.data_sheet.camera.width;
   options.height = options_.data_sheet.camera.height;
   options.adjustment = options_.adjustment;
-  if (free_centre) options.adjustment.centre_sigma_px = kUsualCentreShare * options.width;
+  if (free_centre) {
+    options.adjustment.centre_sigma_px = kUsualCentreShare * options.width;
+  } else if (known == nullptr && is_calibrated_here() && !publication_.is_fresh_wanted()) {
+    // To be compared: axes are told in the camera frame through the centre.
+    options.adjustment.centre_offset_px = publication_.calibration().camera.centre_offset();
+    options.adjustment.centre_sigma_px = 0;
+  }
   options.camera = options_.camera;
   options.noise = options_.noise;
   options.checks = options_.checks;
@@ -155,6 +162,9 @@ CheckedCalibration SelfCalibration::adjust(const Calibration* known, bool free_c
   } else {
     const KnownCalibration prior{*known, publication_.clock_holds()};
     checked = calibrate_session(session_, options, &prior);
+  }
+  if (!free_centre) {
+    checked.result.calibration = with_frame_through_centre(checked.result.calibration);
   }
   checked.result.calibration.zoom = zoom_.reading();
   return checked;

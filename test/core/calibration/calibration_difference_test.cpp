@@ -10,7 +10,6 @@
 #include <utility>
 #include <vector>
 
-#include "core/calibration/centre_share.h"
 #include "core/model/direction.h"
 
 namespace alidade {
@@ -91,40 +90,6 @@ TEST(CalibrationDifference, IsTheSameFromBothSides) {
   const Calibration b = moved(a, d);
   EXPECT_NEAR(difference_chi_square(a, b), difference_chi_square(b, a), 1e-3);
   EXPECT_NEAR(difference_chi_square(a, a), 0, 1e-20);
-}
-
-// Centres drawn from their prior move the axes along; a mount that has moved shows beside that.
-TEST(CalibrationDifference, AFreeCentreHidesNoMovementOfTheMount) {
-  constexpr double kCentreSigma = 19;
-  constexpr double kAcross = 0.8;  // px of the other axis with a px of the centre
-  Calibration a = some_calibration();
-  const double f = a.camera.focal_length;
-  const int c = index(Parameter::kCentreU);
-  internal::CentreShare<kParameterCount> share;
-  share.slope.middleRows<2>(c).setIdentity();
-  share.slope(index(Parameter::kPanAxis0), 0) = 1 / f;
-  share.slope(index(Parameter::kTiltAxis1), 1) = kAcross / f;
-  share.covariance = kCentreSigma * kCentreSigma * Matrix2<double>::Identity();
-  a.covariance.row(index(Parameter::kPanAxis0)) *= 0.01;
-  a.covariance.col(index(Parameter::kPanAxis0)) *= 0.01;
-  const Calibration exact = a;
-  a.covariance += share.part();
-  Calibration b = a;
-  b.camera.set_centre_offset({15, -20});
-  const Eigen::Matrix<double, kParameterCount, 1> along = share.slope * b.camera.centre_offset();
-  b = moved(b, along);
-  EXPECT_LT(difference_chi_square(a, b), 0.01);
-  Eigen::Matrix<double, kParameterCount, 1> d = decltype(d)::Zero();
-  d[index(Parameter::kPanAxis0)] = 10 * parameter_sigma(exact, Parameter::kPanAxis0);
-  EXPECT_LT(d[index(Parameter::kPanAxis0)], kCentreSigma / f);
-  const double alone = difference_chi_square(exact, moved(exact, d));
-  EXPECT_NEAR(difference_chi_square(a, moved(b, d)), alone, 0.02 * alone);
-  // What is sharper is so with the centre held.
-  Calibration after = a;
-  const int axis = index(Parameter::kPanAxis0);
-  after.covariance(axis, axis) -= 0.5 * exact.covariance(axis, axis);
-  EXPECT_TRUE(is_sharper(after, a, 0.75));
-  EXPECT_FALSE(is_sharper(a, a, 0.75));
 }
 
 TEST(CalibrationDifference, AClockOffsetThatIsNotComparedMayBeAny) {
