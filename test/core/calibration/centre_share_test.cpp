@@ -7,7 +7,10 @@
 #include <cmath>
 #include <random>
 
+#include "core/calibration/centre_frame.h"
 #include "core/model/calibration.h"
+#include "core/model/rolling_shutter.h"
+#include "core/model/rotation.h"
 
 namespace alidade::internal {
 namespace {
@@ -87,6 +90,45 @@ TEST(CentreShare, GrowsByWhatTheDataSayOnly) {
   quarter.diagonal().array() += 1 / (kPrior * kPrior);
   EXPECT_LT((grown_centre(V, kPrior, 4) - quarter.inverse()).norm(), 1e-9);
   EXPECT_NEAR(std::sqrt(grown_centre(V, kPrior, 1e9)(0, 0)), kPrior, 1e-6);
+}
+
+// Another centre with the axes turned along: the optical axis looks in the same directions, from
+// another base.
+TEST(CentreFrame, AnotherCentreIsAnotherBase) {
+  Calibration c;
+  c.camera = {10000, 1.1, {0}, 1920, 1080};
+  c.mechanics.pan_axis = Vector3<double>(0.02, -0.01, 1).normalized();
+  c.mechanics.tilt_axis = Vector3<double>(-0.03, 1, 0.02).normalized();
+  const Vector2<double> middle = c.camera.optical_centre();
+  const auto looks = [&](const Calibration& from, double pan, double tilt) {
+    Vector3<double> d;
+    EXPECT_EQ(rolling_shutter_unproject(from.camera, from.mechanics, 0.0,
+                                        {{pan, tilt}, {0, 0}, 0.0}, middle, &d),
+              ProjectionStatus::kOk);
+    return d;
+  };
+  for (const Vector2<double>& by : {Vector2<double>(2, 0), Vector2<double>(0, -3)}) {
+    Calibration other = c;
+    other.camera.set_centre_offset(by);
+    const Eigen::Matrix<double, kParameterCount, 1> turn = axes_by_centre(c) * by;
+    other.mechanics.pan_axis = direction_plus<double>(
+        c.mechanics.pan_axis, Vector2<double>(turn.segment<2>(index(Parameter::kPanAxis0))));
+    other.mechanics.tilt_axis = direction_plus<double>(
+        c.mechanics.tilt_axis, Vector2<double>(turn.segment<2>(index(Parameter::kTiltAxis0))));
+    const Vector3<double> base(0, by.x() / c.camera.focal_length,
+                               by.y() / (c.camera.aspect * c.camera.focal_length));
+    // Of the base: what the camera frame at zero turns by.
+    const Vector3<double> before = looks(c, 0, 0);
+    const Vector3<double> after = looks(other, 0, 0);
+    EXPECT_NEAR((after - before).norm(), base.norm(), 1e-3 * base.norm());
+    const Matrix3<double> Q = exp_so3<double>(before.cross(after));
+    for (const double pan : {-0.5, 0.0, 1.0}) {
+      for (const double tilt : {-0.4, 0.0, 0.6}) {
+        EXPECT_LT((looks(other, pan, tilt) - Q * looks(c, pan, tilt)).norm(), 2e-3 * base.norm())
+            << pan << " " << tilt;
+      }
+    }
+  }
 }
 
 }  // namespace
