@@ -289,8 +289,8 @@ TEST(Calibrate, AFreeCentreHardlyWidensDirections) {
         }
       }
     }
-    EXPECT_LT(sum / compared, 1.05);
-    EXPECT_LT(most, 1.1);
+    EXPECT_LT(sum / compared, 1.1);
+    EXPECT_LT(most, 1.2);  // in the corners of a wide field, where distortion counts
   }
 }
 
