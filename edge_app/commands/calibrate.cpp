@@ -116,21 +116,34 @@ std::string tracks_text(const std::vector<CalibrationObservation>& observations)
   return text;
 }
 
-// The calibration's file has the centre as exact.
-void say_centre(const std::string& recording, const Calibration& calibration) {
-  const double sigma_u = parameter_sigma(calibration, Parameter::kCentreU);
-  const double sigma_v = parameter_sigma(calibration, Parameter::kCentreV);
-  if (!(sigma_u > 0) || !(sigma_v > 0)) return;
-  spdlog::info("{}: optical centre right and down of the picture's middle: {}, {}", recording,
-               estimate_text(calibration.camera.centre_u, sigma_u, "px"),
-               estimate_text(calibration.camera.centre_v, sigma_v, "px"));
+// calibrate_job(), told in a camera frame with an exact optical centre (centre_frame.h).
+CalibrationResult calibrate_in_one_frame(int passes, CalibrationJob* job, StopSignals* signals) {
+  CalibrationResult free = calibrate_job(passes, job, signals);
+  const Vector2<double>& prior = job->options.centre_offset_px;
+  const double prior_sigma = job->options.centre_sigma_px;
+  if (!(prior_sigma > 0) || !free.ok()) return free;
+  const double sigma_u = parameter_sigma(free.calibration, Parameter::kCentreU);
+  const double sigma_v = parameter_sigma(free.calibration, Parameter::kCentreV);
+  const bool is_shown = centre_is_shown(free.calibration, prior, prior_sigma);
+  spdlog::info("{}: optical centre right and down of the picture's middle: {}, {}{}",
+               job->recording, estimate_text(free.calibration.camera.centre_u, sigma_u, "px"),
+               estimate_text(free.calibration.camera.centre_v, sigma_v, "px"),
+               is_shown ? "" : "; taken to be the middle");
+  if (is_shown) {
+    free.calibration = with_frame_through_centre(free.calibration);
+    return free;
+  }
+  CalibrationOptions options = job->options;
+  options.centre_sigma_px = 0;
+  CalibrationResult exact = calibrate(job->input, options);
+  if (!exact.ok()) return exact;
+  exact.calibration = with_centre_error(exact.calibration, free.calibration);
+  return exact;
 }
 
 int calibrate_one(const CalibrateOptions& options, CalibrationJob job, StopSignals* signals) {
   const std::string& recording = job.recording;
-  CalibrationResult result = calibrate_job(options.passes, &job, signals);
-  say_centre(recording, result.calibration);
-  result.calibration = with_frame_through_centre(result.calibration);
+  const CalibrationResult result = calibrate_in_one_frame(options.passes, &job, signals);
   for (const std::string& remark : job.remarks) spdlog::warn("{}: {}", recording, remark);
   // Without a solution there is nothing to plot.
   if (result.frames.empty()) {

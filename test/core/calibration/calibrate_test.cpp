@@ -328,6 +328,14 @@ TEST(Calibrate, TellsAxesInTheFrameThroughItsCentre) {
           Parameter::kPanAxis1, Parameter::kTiltAxis0, Parameter::kTiltAxis1}) {
       EXPECT_LT(std::abs(error[index(p)]), kSigmas * parameter_sigma(c, p)) << to_string(p);
     }
+    // The middle as exact, with what the centre's error does.
+    const CalibrationResult exact = calibrate(simulate(s));
+    ASSERT_TRUE(exact.ok()) << exact.message;
+    const Calibration middle = with_centre_error(exact.calibration, result.calibration);
+    error = calibration_error(s, middle);
+    for (const Parameter p : {Parameter::kFocalLength, Parameter::kRadialDistortion}) {
+      EXPECT_LT(std::abs(error[index(p)]), kSigmas * parameter_sigma(middle, p)) << to_string(p);
+    }
   }
 }
 

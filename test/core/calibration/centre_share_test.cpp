@@ -92,6 +92,35 @@ TEST(CentreShare, GrowsByWhatTheDataSayOnly) {
   EXPECT_NEAR(std::sqrt(grown_centre(V, kPrior, 1e9)(0, 0)), kPrior, 1e-6);
 }
 
+TEST(CentreFrame, TheCentreIsShownWhereChanceDoesNotMoveItSoFar) {
+  constexpr double kPrior = 6.4;
+  constexpr double kData = 0.5;  // px
+  Calibration c;
+  const int u = index(Parameter::kCentreU);
+  const double variance = 1 / (1 / (kData * kData) + 1 / (kPrior * kPrior));
+  c.covariance(u, u) = c.covariance(u + 1, u + 1) = variance;
+  std::mt19937 random(4);
+  std::normal_distribution<double> normal;
+  int shown = 0;
+  constexpr int kDraws = 4000;
+  for (int draw = 0; draw < kDraws; ++draw) {
+    // The data's mean, drawn to the prior's.
+    const double share = variance / (kData * kData);
+    c.camera.set_centre_offset(share * kData * Vector2<double>(normal(random), normal(random)));
+    if (centre_is_shown(c, Vector2<double>::Zero(), kPrior)) ++shown;
+  }
+  EXPECT_LE(shown, 14);  // 4 expected; more than 14 in one of 10,000 trials
+  c.camera.set_centre_offset({3, -2});
+  EXPECT_TRUE(centre_is_shown(c, Vector2<double>::Zero(), kPrior));
+  EXPECT_FALSE(centre_is_shown(c, {3, -2}, kPrior));
+  // Where the prior decides, it stays.
+  c.covariance(u, u) = 0.6 * kPrior * kPrior;
+  c.camera.set_centre_offset({20, 0});
+  EXPECT_FALSE(centre_is_shown(c, Vector2<double>::Zero(), kPrior));
+  c.covariance.setZero();
+  EXPECT_FALSE(centre_is_shown(c, Vector2<double>::Zero(), kPrior));
+}
+
 // Another centre with the axes turned along: the optical axis looks in the same directions, from
 // another base.
 TEST(CentreFrame, AnotherCentreIsAnotherBase) {
