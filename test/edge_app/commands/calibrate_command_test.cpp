@@ -152,18 +152,27 @@ TEST_F(CalibrateCommand, StatesAndUsesThePriorsOfItsOptions) {
   EXPECT_EQ(priors["pan_scale"]["sigma"], 0.001);
 }
 
-TEST_F(CalibrateCommand, LeavesTheOpticalCentreFreeUnlessItIsStatedExact) {
+TEST_F(CalibrateCommand, FindsTheOpticalCentreUnlessItIsStatedExact) {
   test::Simulation simulation;
-  simulation.optical_centre_offset_px = {12, -9};
+  simulation.radial_distortion = 0.4;  // 3 % in the corner
+  simulation.optical_centre_offset_px = {24, -15};
   record(simulation);
   ASSERT_EQ(calibrate_command({path()}).exit_code, 0);
-  Calibration calibration = stored();
-  expect_near_truth(calibration, simulation_);
-  const double sigma = parameter_sigma(calibration, Parameter::kCentreU);
-  EXPECT_GT(sigma, 0);
-  EXPECT_LE(sigma, 0.01 * simulation.width);
+  const Calibration found = stored();
+  EXPECT_NEAR(found.camera.centre_u, 24, 5);
+  EXPECT_NEAR(found.camera.centre_v, -15, 5);
+  EXPECT_EQ(parameter_sigma(found, Parameter::kCentreU), 0);
+  EXPECT_NEAR(found.camera.distortion.radial, 0.4,
+              5 * parameter_sigma(found, Parameter::kRadialDistortion));
   ASSERT_EQ(calibrate_command({path(), "--centre-sigma", "0"}).exit_code, 0);
   EXPECT_FALSE(stored().has_centre());
+}
+
+TEST_F(CalibrateCommand, TakesTheMiddleForTheCentreWhereTheDataShowNoOther) {
+  record(test::Simulation());
+  ASSERT_EQ(calibrate_command({path()}).exit_code, 0);
+  EXPECT_FALSE(stored().has_centre());
+  expect_near_truth(stored(), simulation_);
 }
 
 // The lens.yaml of the simulated camera, for images of this size.
