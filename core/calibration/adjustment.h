@@ -10,6 +10,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <cstddef>
 #include <functional>
 #include <vector>
 
@@ -38,6 +39,12 @@ class Adjustment {
              const std::array<bool, kGlobalCount>& fixed,
              Eigen::Index largest_direct = kLargestDirect)
       : lineariser_(data, priors, fixed), fixed_(fixed), largest_direct_(largest_direct) {}
+
+  // From now on the parameter keeps its value, which is taken as exact.
+  void hold(int parameter) {
+    fixed_[static_cast<std::size_t>(parameter)] = true;
+    lineariser_.hold(parameter);
+  }
 
   void linearise(const AdjustmentState& state, const LossScales& loss, Linearisation* out) {
     lineariser_.linearise(state, loss, out);

@@ -5,6 +5,13 @@
 
 namespace alidade {
 
+namespace {
+
+constexpr double kPupil_m = 0.05;  // usual, of lenses on heads
+constexpr const char* kDifferentDistances = "different distances";
+
+}  // namespace
+
 bool CalibrationOptions::validate(std::string* error) const {
   const char* problem = nullptr;
   const auto check = [&problem](const CalibrationPrior& prior, bool positive, const char* what) {
@@ -110,6 +117,12 @@ std::vector<std::string> CalibrationQuality::describe_departures() const {
   for (const CalibrationCause& c : causes) {
     lines.push_back((&c == &causes.front() ? "likeliest cause: " : "beside it: ") + c.cause + ", " +
                     number(c.size) + " " + c.unit + "; the sigmas have what it does");
+    if (c.cause == kDifferentDistances && c.size > 0) {
+      lines.push_back("what is nearer than " + number(1e3 * kPupil_m / c.size) +
+                      " m is seen where it is not, beyond the focal length's sigma, if the lens's "
+                      "pupil lies " +
+                      number(100 * kPupil_m) + " cm before or behind the axes");
+    }
   }
   return lines;
 }

@@ -77,7 +77,7 @@ struct CalibrationOptions {
   std::optional<CalibrationPrior> aspect = CalibrationPrior{1, 0};
   std::optional<CalibrationPrior> radial_distortion;
   // Offset of the optical centre from the image's middle. At one zoom it can hardly be
-  // distinguished from a turn of the axes.
+  // distinguished from a turn of the axes, so the sigmas of both include that.
   Vector2<double> centre_offset_px = Vector2<double>::Zero();
   double centre_sigma_px = 0;                    // each component; 0: known exactly
   std::optional<CalibrationPrior> line_delay;    // s/row

@@ -21,6 +21,10 @@ constexpr std::size_t kMostCauses = 4;
 // What the other unknowns leave of a combination of columns; less is theirs.
 constexpr double kLeastLeft = 1e-6;
 
+// Mean of the inverse distances over their spread: 1 to 5 in scenes whose farthest thing is 30 to 2
+// times as far as the nearest.
+constexpr double kCommonDepth = 2.5;
+
 constexpr int kGearKnots = 12;
 constexpr int kDriftKnots = 8;
 constexpr int kHeights = 5;  // nodes over the scene, from its lowest to its highest landmark
@@ -236,6 +240,8 @@ Fit fit(const Eigen::MatrixXd& information, const Eigen::VectorXd& full,
   return out;
 }
 
+double half_range(const Eigen::VectorXd& x) { return 0.5 * (x.maxCoeff() - x.minCoeff()); }
+
 std::vector<Suspect> suspects(const AdjustmentState& state,
                               const std::array<bool, kGlobalCount>& fixed) {
   const double f = state.camera.focal_length;
@@ -270,6 +276,10 @@ Departures find_departures(const Adjustment& adjustment, const AdjustmentState& 
   std::vector<Suspect> left = suspects(state, adjustment.fixed());
   const double limit = std::log(kFalseCause / static_cast<double>(left.size() + 1));
   Departures found;
+  const auto add_to_focal_length = [&](double variance) {
+    const int f = index(Parameter::kFocalLength);
+    if (!adjustment.fixed()[static_cast<std::size_t>(f)]) found.error(f, f) += variance;
+  };
   double likeliest = limit;
   const Eigen::VectorXd full = score.full_information().diagonal();
   Eigen::MatrixXd N = score.information();
@@ -299,6 +309,8 @@ Departures find_departures(const Adjustment& adjustment, const AdjustmentState& 
     const DepartureEffect effect = score.effect().middleCols(c.first, c.count);
     const GlobalVector error = effect * best_fit.theta;
     found.error += error * error.transpose();
+    // The published focal length is one for all times, also for those after the recording.
+    if (c.first == kFocusDrift) add_to_focal_length(std::pow(half_range(best_fit.theta), 2));
     // What is left beside it.
     const Eigen::MatrixXd rows = N.middleRows(c.first, c.count);
     const Eigen::VectorXd s_of_it = s.segment(c.first, c.count);
@@ -312,15 +324,12 @@ Departures find_departures(const Adjustment& adjustment, const AdjustmentState& 
       N -= tied * (along.transpose() * rows);
     }
   }
-  const DepthSpread spread = depth_spread(adjustment, state, at);
+  const DepthSpread spread = depth_spread(adjustment, state, at, factor);
   if (spread.log_chance < limit) {
     found.causes.insert(spread.log_chance < likeliest ? found.causes.begin() : found.causes.end(),
                         {"different distances", spread.excess, spread.landmarks, 1e3 * spread.sigma,
                          "per mille of the focal length"});
-    const int f = index(Parameter::kFocalLength);
-    if (!adjustment.fixed()[static_cast<std::size_t>(f)]) {
-      found.error(f, f) += spread.sigma * spread.sigma;
-    }
+    add_to_focal_length(std::pow(kCommonDepth * spread.sigma, 2));
   }
   return found;
 }

@@ -171,6 +171,9 @@ class Lineariser {
              const std::array<bool, kGlobalCount>& fixed)
       : data_(data), priors_(priors), fixed_(fixed) {}
 
+  // As if it had been fixed from the start.
+  void hold(int parameter) { fixed_[static_cast<std::size_t>(parameter)] = true; }
+
   // Replaces all that *out holds, and reuses its memory.
   void linearise(const AdjustmentState& state, const LossScales& loss, Linearisation* out);
 

@@ -84,6 +84,7 @@ StagedAdjustment::StagedAdjustment(const StartValues& start, const TelemetryAngl
     : selected_(selected),
       noise_(noise),
       max_knots_(options.max_knots),
+      centre_sigma_px_(options.centre_sigma_px),
       doubt_(start.doubt),
       adjustment_(selected->data, start.prior.priors, start.prior.fixed),
       departures_(start.prior.fixed, noise.resolution_rad, options.angle_accuracy_rad) {
@@ -131,6 +132,10 @@ StageStatus StagedAdjustment::adjust_on_inliers(CalibrationQuality* quality) {
             "image's size right, and are all tracks from one zoom?" +
                 doubt_};
   }
+  if (!hold_centre()) {
+    return {CalibrationStatus::kNotConverged,
+            "the adjustment does not converge with the optical centre held"};
+  }
   StageStatus status = allow_for_repetition(quality);
   if (!status.ok()) return status;
   allow_for_shared_errors();
@@ -139,6 +144,7 @@ StageStatus StagedAdjustment::adjust_on_inliers(CalibrationQuality* quality) {
     adjusted_.covariance += departures_.covariance();
     adjusted_.telemetry_error = departures_.error();
   }
+  release_centre();
   return {};
 }
 
@@ -265,6 +271,35 @@ bool StagedAdjustment::correct_noise(CalibrationQuality* quality) {
     quality->telemetry_sigma_ratio *= ratios.telemetry.ratio;
   }
   return ratios.pixel.contradicts() || ratios.telemetry.contradicts();
+}
+
+// At the minimum, where the centre is, it stays. Nothing to do if it is exact.
+bool StagedAdjustment::hold_centre() {
+  centre_ = centre_share<kGlobalCount>(adjusted_.covariance);
+  if (!centre_.exists()) return true;
+  for (const Parameter p : {Parameter::kCentreU, Parameter::kCentreV}) {
+    adjustment_.hold(index(p));
+    departures_.hold(index(p));
+  }
+  adjustment_.linearise(adjusted_.state, {}, &adjusted_.at);
+  if (!adjustment_.covariance(adjusted_.at, &adjusted_.covariance, &telemetry_unknowns_) ||
+      (departs_ && !settle_known_departures())) {
+    return false;
+  }
+  centre_held_ = adjusted_.covariance;
+  return true;
+}
+
+// What the data say of the centre loses as much as the most that another parameter lost.
+void StagedAdjustment::release_centre() {
+  if (!centre_.exists()) return;
+  double growth = 1;
+  for (int p = 0; p < kGlobalCount; ++p) {
+    if (centre_held_(p, p) > 0)
+      growth = std::max(growth, adjusted_.covariance(p, p) / centre_held_(p, p));
+  }
+  centre_.covariance = grown_centre(centre_.covariance, centre_sigma_px_, growth);
+  adjusted_.covariance += centre_.part();
 }
 
 StageStatus StagedAdjustment::allow_for_repetition(CalibrationQuality* quality) {

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "core/calibration/adjustment.h"
+#include "core/calibration/centre_share.h"
 #include "core/calibration/drifting_tracks.h"
 #include "core/calibration/input_selection.h"
 #include "core/calibration/stage_status.h"
@@ -38,8 +39,9 @@ class StagedAdjustment {
   // Least squares on the rest, as a robust loss on good data would inflate the sigmas. Outliers are
   // marked again. Noise levels that the residuals contradict beyond chance are replaced by the
   // residuals' (noise_check.h). The covariance grows if residuals move the parameters together
-  // (shared_errors.h), and if parts of the recording contradict each other (contradictions.h). Sets
-  // the quality's steps, ratios, repetition and contradiction.
+  // (shared_errors.h), and if parts of the recording contradict each other (contradictions.h), with
+  // the optical centre held (centre_share.h). Sets the quality's steps, ratios, repetition and
+  // contradiction.
   [[nodiscard]] StageStatus adjust_on_inliers(CalibrationQuality* quality);
 
   [[nodiscard]] const Adjusted& adjusted() const { return adjusted_; }
@@ -56,6 +58,8 @@ class StagedAdjustment {
   void replace_rounded_telemetry();
   bool mark_outliers();
   bool correct_noise(CalibrationQuality* quality);
+  [[nodiscard]] bool hold_centre();
+  void release_centre();
   [[nodiscard]] StageStatus allow_for_repetition(CalibrationQuality* quality);
   void allow_for_shared_errors();
   void allow_for_contradictions(CalibrationQuality* quality);
@@ -63,6 +67,7 @@ class StagedAdjustment {
   SelectedInput* selected_;
   TelemetryAngleNoise noise_;
   int max_knots_;
+  double centre_sigma_px_;  // prior
   std::string doubt_;
   Adjustment adjustment_;
   TelemetryDepartures departures_;
@@ -70,7 +75,9 @@ class StagedAdjustment {
   Adjusted adjusted_;
   AdjustmentState start_;
   double telemetry_unknowns_ = 0;
-  bool settled_ = false;  // by settle_robustly()
+  CentreShare<kGlobalCount> centre_;
+  GlobalMatrix centre_held_ = GlobalMatrix::Zero();  // covariance before it grew
+  bool settled_ = false;                             // by settle_robustly()
   DriftFinding drift_ = DriftFinding::kNone;
   double drift_px_s_ = 0;
   int drifting_ = 0;  // observations

@@ -37,6 +37,9 @@ class TelemetryDepartures {
   // larger where the play's state is not known.
   void subtract(const AdjustmentState& state, const Linearisation& at, AdjustmentData* data);
 
+  // The adjustment now takes this parameter as exact.
+  void hold(int parameter) { fixed_[static_cast<std::size_t>(parameter)] = true; }
+
   // The readings' sigmas were multiplied by this.
   void scale_noise(double ratio);
 

@@ -87,6 +87,10 @@ bool make_frame_orientation(const Calibration& calibration, double time_s, Orien
       R_base_from_camera(calibration.mechanics, angle, &J_xi_angle, &J_xi_axes);
   Sensitivity<3> sensitivity = J_xi_angle * sensitivity_at_row_0.topRows<2>();
   sensitivity.middleCols<4>(index(Parameter::kPanAxis0)) += J_xi_axes;
+  // A centre that is off turns the directions of the picture's middle, as xi_v and xi_u would.
+  const Camera<double>& camera = calibration.camera;
+  sensitivity(1, index(Parameter::kCentreU)) -= 1 / camera.focal_length;
+  sensitivity(0, index(Parameter::kCentreV)) += 1 / (camera.aspect * camera.focal_length);
   const Matrix3<double> orientation_covariance =
       J_xi_angle * covariance_at_row_0.topLeftCorner<2, 2>() * J_xi_angle.transpose() +
       sensitivity * calibration.covariance * sensitivity.transpose();

@@ -4,7 +4,9 @@
 //   direction = R_base_from_camera(angle + rate t + acceleration t^2 / 2) unproject(u),
 //   t = v * line_delay   (PTCEE 26, 27, and beyond)
 // Angles are TRUE (rad): the measured ones divided by the calibrated scales. Frames: base b (FRD),
-// camera c (RDF). An orientation is perturbed as R Exp(xi), xi in the camera frame (PTCEE 5).
+// camera c (RDF). An orientation is perturbed as R Exp(xi), xi in the camera frame (PTCEE 5). xi is
+// what directions are off by in the picture's middle: an optical centre that is off by c px is in
+// it, together with the axes, which that turned by c / f.
 // Pixels are continuous; the centre of the top-left one is (0.5, 0.5). Covariances are first-order
 // and contain the calibration's. No allocation; plain values; any number of threads may read one.
 

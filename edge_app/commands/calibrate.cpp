@@ -13,6 +13,9 @@
 #include <utility>
 #include <vector>
 
+#include "core/calibration/centre_frame.h"
+#include "core/calibration/number_text.h"
+#include "core/calibration/zoom_fit.h"
 #include "edge_app/commands/calibrate.h"
 #include "edge_app/commands/calibrate_zooms.h"
 #include "edge_app/commands/calibration_input.h"
@@ -57,7 +60,7 @@ void set_prior(const char* option, const std::string& text, const char* unit,
   *prior = read;
 }
 
-void set_priors(const CalibrateOptions& options, CalibrationOptions* calibration) {
+void set_priors(const CalibrateOptions& options, int width, CalibrationOptions* calibration) {
   set_prior("--focal-length", options.focal_length, "px", &calibration->focal_length);
   set_prior("--aspect", options.aspect, "f_v / f_u", &calibration->aspect);
   static_assert(kDistortionCount == 1, "an option for each term");
@@ -68,6 +71,7 @@ void set_priors(const CalibrateOptions& options, CalibrationOptions* calibration
     calibration->pan_scale.sigma = *options.scale_sigma;
     calibration->tilt_scale.sigma = *options.scale_sigma;
   }
+  calibration->centre_sigma_px = options.centre_sigma_px.value_or(kUsualCentreShare * width);
   std::string error;
   if (!calibration->validate(&error)) throw CommandError(kExitUsage, error);
 }
@@ -94,7 +98,7 @@ std::vector<CalibrationJob> load_jobs(const CalibrateOptions& options) {
   std::vector<CalibrationJob> jobs;
   for (const std::string& recording : options.recordings) {
     for (CalibrationJob& job : load_calibration_jobs(recording, options.zoom_tolerance)) {
-      set_priors(options, &job.options);
+      set_priors(options, job.input.width, &job.options);
       set_lens_prior(options, &job);
       jobs.push_back(std::move(job));
     }
@@ -112,9 +116,34 @@ std::string tracks_text(const std::vector<CalibrationObservation>& observations)
   return text;
 }
 
+// calibrate_job(), told in a camera frame with an exact optical centre (centre_frame.h).
+CalibrationResult calibrate_in_one_frame(int passes, CalibrationJob* job, StopSignals* signals) {
+  CalibrationResult free = calibrate_job(passes, job, signals);
+  const Vector2<double>& prior = job->options.centre_offset_px;
+  const double prior_sigma = job->options.centre_sigma_px;
+  if (!(prior_sigma > 0) || !free.ok()) return free;
+  const double sigma_u = parameter_sigma(free.calibration, Parameter::kCentreU);
+  const double sigma_v = parameter_sigma(free.calibration, Parameter::kCentreV);
+  const bool is_shown = centre_is_shown(free.calibration, prior, prior_sigma);
+  spdlog::info("{}: optical centre right and down of the picture's middle: {}, {}{}",
+               job->recording, estimate_text(free.calibration.camera.centre_u, sigma_u, "px"),
+               estimate_text(free.calibration.camera.centre_v, sigma_v, "px"),
+               is_shown ? "" : "; taken to be the middle");
+  if (is_shown) {
+    free.calibration = with_frame_through_centre(free.calibration);
+    return free;
+  }
+  CalibrationOptions options = job->options;
+  options.centre_sigma_px = 0;
+  CalibrationResult exact = calibrate(job->input, options);
+  if (!exact.ok()) return exact;
+  exact.calibration = with_centre_error(exact.calibration, free.calibration);
+  return exact;
+}
+
 int calibrate_one(const CalibrateOptions& options, CalibrationJob job, StopSignals* signals) {
   const std::string& recording = job.recording;
-  const CalibrationResult result = calibrate_job(options.passes, &job, signals);
+  const CalibrationResult result = calibrate_in_one_frame(options.passes, &job, signals);
   for (const std::string& remark : job.remarks) spdlog::warn("{}: {}", recording, remark);
   // Without a solution there is nothing to plot.
   if (result.frames.empty()) {

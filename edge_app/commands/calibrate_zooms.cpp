@@ -35,6 +35,11 @@ void refuse_priors_of_one_zoom(const CalibrateOptions& options, std::size_t stre
   };
   refuse("--focal-length", options.focal_length);
   refuse("--radial-distortion", options.radial_distortion);
+  if (options.centre_sigma_px == 0) {
+    throw CommandError(kExitUsage,
+                       "--centre-sigma 0: a zoom curve is made of calibrations with a free optical "
+                       "centre; give more than 0 px, or leave it out");
+  }
 }
 
 void require_readings(const std::vector<CalibrationJob>& jobs) {
@@ -168,7 +173,6 @@ int calibrate_zooms(const CalibrateOptions& options, std::vector<CalibrationJob>
   for (std::size_t i = 0; i < jobs.size(); ++i) {
     CalibrationJob& job = jobs[i];
     const std::string name = fmt::format("{} at zoom {:g}", job.recording, *job.zoom);
-    job.options.centre_sigma_px = kUsualCentreShare * job.input.width;
     CalibrationResult result = calibrate_job(options.passes, &job, signals);
     for (const std::string& remark : job.remarks) spdlog::warn("{}: {}", name, remark);
     if (!result.frames.empty()) {

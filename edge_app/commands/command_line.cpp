@@ -51,6 +51,13 @@ std::string is_share(const std::string& text) {
              : fmt::format("'{}' is not a number from 0 to 1", text);
 }
 
+std::string is_length_px(const std::string& text) {
+  const std::optional<double> value = number_of(text);
+  return value && *value >= 0 && *value <= 1e4
+             ? ""
+             : fmt::format("'{}' is not a number of pixels from 0 to 10000", text);
+}
+
 void add_run(CLI::App& app, int* exit_code) {
   auto options = std::make_shared<RunOptions>();
   CLI::App* command =
@@ -180,6 +187,12 @@ void add_calibrate(CLI::App& app, int* exit_code) {
                    "Relative sigma of the scale from true to measured angles (default: "
                    "noise.yaml's pan_tilt_scale_sigma, or 1e-8)")
       ->check(is_share)
+      ->group(group);
+  command
+      ->add_option("--centre-sigma", options->centre_sigma_px,
+                   "px; how far the optical centre may be from the picture's middle, one sigma; 0: "
+                   "it is the middle (default: 1 % of the width)")
+      ->check(is_length_px)
       ->group(group);
   command->callback([options, exit_code] { *exit_code = calibrate_recordings(*options); });
 }

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "core/calibration/zoom_fit.h"
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/lens_prior.h"
 #include "edge_app/commands/scene_loading.h"
@@ -109,6 +110,8 @@ Calibrating begin_calibrating(const Config& config, const std::string& path,
     options.noise.pan_tilt_sigma_rad = std::hypot(
         *config.pan_tilt.angle_sigma_rad, config.pan_tilt.angle_quantum_rad / std::sqrt(12.0));
   }
+  options.adjustment.centre_sigma_px =
+      config.camera.centre_sigma_px.value_or(kUsualCentreShare * camera.width);
   options.zoom_tolerance = config.calibration.zoom_tolerance;
   options.zooms = config.camera.focal_length_range.has_value();
   options.automatic = config.calibration.automatic;

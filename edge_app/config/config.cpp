@@ -47,6 +47,7 @@ CameraConfig read_camera(YamlSection section) {
   camera.aspect = section.number("aspect", {0.5, 2, "1"}).value_or(camera.aspect);
   camera.radial_distortion =
       section.number("radial_distortion", {-1e8, 1e8, "1"}).value_or(camera.radial_distortion);
+  camera.centre_sigma_px = section.number("centre_sigma_px", {0, 1e4, "px"});
   camera.line_delay_s =
       section.number("line_delay_s", {-1e-3, 1e-3, "s/row"}).value_or(camera.line_delay_s);
   camera.upside_down = section.truth("upside_down").value_or(camera.upside_down);

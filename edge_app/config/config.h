@@ -34,6 +34,9 @@ struct CameraConfig {
   std::optional<FocalLengthRange> focal_length_range;
   double aspect = 1;
   double radial_distortion = 0;
+  // Of the optical centre about the picture's middle, in each calibration. 0: it is the middle.
+  // Empty: 1 % of the width.
+  std::optional<double> centre_sigma_px;
   double line_delay_s = 0;  // s/row, of the sensor read from top to bottom
   // The camera hangs upside down and turns its image by 180 degrees; negates line_delay_s.
   bool upside_down = false;

@@ -208,6 +208,12 @@ std::vector<std::pair<std::string, CalibrationPrior>> stated_priors(
   add(Parameter::kAspect, options.aspect);
   static_assert(kDistortionCount == 1, "the prior of each term");
   add(Parameter::kRadialDistortion, options.radial_distortion);
+  if (options.centre_sigma_px > 0) {
+    add(Parameter::kCentreU,
+        CalibrationPrior{options.centre_offset_px.x(), options.centre_sigma_px});
+    add(Parameter::kCentreV,
+        CalibrationPrior{options.centre_offset_px.y(), options.centre_sigma_px});
+  }
   add(Parameter::kLineDelay, options.line_delay);
   for (const Parameter axis :
        {Parameter::kPanAxis0, Parameter::kPanAxis1, Parameter::kTiltAxis0, Parameter::kTiltAxis1}) {

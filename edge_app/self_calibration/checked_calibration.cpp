@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/calibration/centre_share.h"
 #include "core/calibration/held_out.h"
 #include "core/calibration/partial_inverse.h"
 #include "edge_app/self_calibration/calibration_streams.h"
@@ -17,11 +18,19 @@
 namespace alidade {
 namespace {
 
+using internal::CentreShare;
+
 // common_s: the error common to all polls. It is in the known clock offset and in the new data
-// alike.
-void set_priors(const KnownCalibration& known, double inflation, double common_s,
-                CalibrationOptions* adjustment) {
-  const Calibration& calibration = known.calibration;
+// alike. A free optical centre stays where it is known to be; the others' sigmas are then those with
+// the centre held. Returns the centre's share of the known covariance.
+CentreShare<kParameterCount> set_priors(const KnownCalibration& known, double inflation,
+                                        double common_s, CalibrationOptions* adjustment) {
+  const CentreShare<kParameterCount> centre =
+      internal::centre_share<kParameterCount>(known.calibration.covariance);
+  Calibration calibration = known.calibration;
+  calibration.covariance = internal::with_centre_held(calibration.covariance, centre);
+  adjustment->centre_offset_px = calibration.camera.centre_offset();
+  adjustment->centre_sigma_px = 0;
   const auto prior = [&](double value, Parameter p) {
     return CalibrationPrior{value, inflation * parameter_sigma(calibration, p)};
   };
@@ -44,6 +53,7 @@ void set_priors(const KnownCalibration& known, double inflation, double common_s
     adjustment->axis_sigma_rad =
         std::max(adjustment->axis_sigma_rad, inflation * parameter_sigma(calibration, p));
   }
+  return centre;
 }
 
 // Multiplies the covariance by factor^2, except the priors' part, as a calibration that becomes one
@@ -121,7 +131,8 @@ CheckedCalibration calibrate_session(const CalibrationSession& session,
   // The error common to all polls is not averaged out by several calibrations. It is added to the
   // result instead.
   const double common_s = std::exchange(input.noise.telemetry_common_sigma_s, 0.0);
-  if (known != nullptr) set_priors(*known, options.prior_inflation, common_s, &adjustment);
+  CentreShare<kParameterCount> centre;
+  if (known != nullptr) centre = set_priors(*known, options.prior_inflation, common_s, &adjustment);
   input.observations = choose_tracks(session.observations(), options.max_observations);
   const std::vector<CalibrationObservation> held_out = take_held_out(stamps, &input.observations);
 
@@ -146,6 +157,7 @@ CheckedCalibration calibrate_session(const CalibrationSession& session,
       !grow_beyond_priors(checked.adjustment, excess, &result.calibration)) {
     result.calibration.covariance *= excess * excess;
   }
+  result.calibration.covariance += centre.part();
   const int d = index(Parameter::kClockOffset);
   result.calibration.covariance(d, d) += common_s * common_s;
   return checked;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/calibration/calibration_difference.h"
+#include "core/calibration/centre_frame.h"
 #include "core/calibration/number_text.h"
 #include "core/calibration/zoom_fit.h"
 #include "edge_app/self_calibration/calibration_refusal.h"
@@ -162,17 +163,34 @@ CheckedCalibration SelfCalibration::adjust(const Calibration* known, bool free_c
   options.width = options_.data_sheet.camera.width;
   options.height = options_.data_sheet.camera.height;
   options.adjustment = options_.adjustment;
-  if (free_centre) options.adjustment.centre_sigma_px = kUsualCentreShare * options.width;
+  if (free_centre) {
+    options.adjustment.centre_sigma_px = kUsualCentreShare * options.width;
+  } else if (known == nullptr && is_calibrated_here() && !publication_.is_fresh_wanted()) {
+    // To be compared: axes are told in the camera frame through the centre.
+    options.adjustment.centre_offset_px = publication_.calibration().camera.centre_offset();
+    options.adjustment.centre_sigma_px = 0;
+  }
   options.camera = options_.camera;
   options.noise = options_.noise;
   options.checks = options_.checks;
   options.is_cancelled = [this] { return cancelled_.load(); };
-  CheckedCalibration checked;
-  if (known == nullptr) {
-    checked = calibrate_session(session_, options, nullptr);
-  } else {
+  const auto calibrate_with = [&](const CheckedCalibrationOptions& with) {
+    if (known == nullptr) return calibrate_session(session_, with, nullptr);
     const KnownCalibration prior{*known, publication_.clock_holds()};
-    checked = calibrate_session(session_, options, &prior);
+    return calibrate_session(session_, with, &prior);
+  };
+  CheckedCalibration checked = calibrate_with(options);
+  const double centre_sigma_px = options.adjustment.centre_sigma_px;
+  if (known == nullptr && !free_centre && checked.refusal.empty() && centre_sigma_px > 0) {
+    // Told in a camera frame with an exact centre.
+    const Calibration free = checked.result.calibration;
+    if (centre_is_shown(free, options.adjustment.centre_offset_px, centre_sigma_px)) {
+      checked.result.calibration = with_frame_through_centre(free);
+    } else {
+      options.adjustment.centre_sigma_px = 0;
+      checked = calibrate_with(options);
+      checked.result.calibration = with_centre_error(checked.result.calibration, free);
+    }
   }
   checked.result.calibration.zoom = zoom_.reading();
   return checked;

@@ -34,6 +34,7 @@ void require_sound(const Config& config) {
   FUZZ_REQUIRE(is_within(config.camera.focal_length_px.value_or(1), 1, 1e8));
   FUZZ_REQUIRE(is_within(config.camera.aspect, 0.5, 2));
   FUZZ_REQUIRE(is_within(config.camera.line_delay_s, -1e-3, 1e-3));
+  FUZZ_REQUIRE(is_within(config.camera.centre_sigma_px.value_or(0), 0, 1e4));
   FUZZ_REQUIRE(is_within(config.realtime.priority, 0, 99));
   FUZZ_REQUIRE(is_within(config.realtime.cpu, -1, 1023));
   FUZZ_REQUIRE(!config.tracking.targets || config.tracking.targets->validate());

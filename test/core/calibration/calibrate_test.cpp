@@ -7,6 +7,9 @@
 #include <limits>
 #include <random>
 
+#include "core/calibration/centre_frame.h"
+#include "core/model/direction.h"
+#include "core/model/rolling_shutter.h"
 #include "test/support/errors_in_sigmas.h"
 #include "test/support/simulated_recording.h"
 
@@ -221,6 +224,101 @@ TEST(Calibrate, EstimatesTheAspectWhenAsked) {
   CalibrationOptions options;
   options.aspect = std::nullopt;
   expect_within_sigmas(s, calibrate(simulate(s), options));
+}
+
+// Covariance (rad^2) of where a pixel looks at true angles.
+Matrix2<double> direction_covariance(const Calibration& c, const Vector2<double>& u,
+                                     const Eigen::Vector2d& angle) {
+  Vector3<double> d;
+  Matrix<double, 3, kParameterCount> J;
+  EXPECT_EQ(
+      rolling_shutter_unproject(c.camera, c.mechanics, c.line_delay,
+                                {{angle[0], angle[1]}, {0, 0}, 0.0}, u, &d, nullptr, nullptr, &J),
+      ProjectionStatus::kOk);
+  const Sensitivity<2> to_tangent = tangent_basis(d).transpose() * J;
+  return to_tangent * c.covariance * to_tangent.transpose();
+}
+
+TEST(Calibrate, AFreeCentreHardlyWidensDirections) {
+  for (const double f : {1500.0, 4000.0, 30000.0}) {
+    Simulation s = small_simulation(31);
+    s.focal_length = f;
+    s.radial_distortion = 0.05 * f * f / (1100.0 * 1100.0);
+    const CalibrationInput input = simulate(s);
+    const CalibrationResult exact = calibrate(input);
+    CalibrationOptions options;
+    options.centre_sigma_px = 19;
+    CalibrationResult open = calibrate(input, options);
+    SCOPED_TRACE(f);
+    expect_within_sigmas(s, open);
+    ASSERT_TRUE(exact.ok()) << exact.message;
+    EXPECT_GT(
+        open.calibration.covariance(index(Parameter::kPanAxis0), index(Parameter::kPanAxis0)),
+        exact.calibration.covariance(index(Parameter::kPanAxis0), index(Parameter::kPanAxis0)));
+    open.calibration = with_frame_through_centre(open.calibration);
+    double most = 0;
+    double sum = 0;
+    int compared = 0;
+    for (const double u : {300.0, 960.0, 1620.0}) {
+      for (const double v : {200.0, 540.0, 880.0}) {
+        for (const double t : {0.0, 1.5, 3.0, 4.5, 6.0, 7.5}) {
+          const double with = direction_covariance(open.calibration, {u, v}, s.angles(t)).trace();
+          const double without =
+              direction_covariance(exact.calibration, {u, v}, s.angles(t)).trace();
+          most = std::max(most, std::sqrt(with / without));
+          sum += std::sqrt(with / without);
+          ++compared;
+        }
+      }
+    }
+    EXPECT_LT(sum / compared, 1.1);
+    EXPECT_LT(most, 1.2);  // in the corners of a wide field, where distortion counts
+  }
+}
+
+TEST(Calibrate, FindsAFreeCentreWithinItsSigmas) {
+  for (const double f : {1500.0, 4000.0, 30000.0}) {
+    Simulation s = small_simulation(32);
+    s.focal_length = f;
+    s.radial_distortion = -0.05 * f * f / (1100.0 * 1100.0);
+    s.optical_centre_offset_px = {22, -14};
+    CalibrationOptions options;
+    options.centre_sigma_px = 19;
+    SCOPED_TRACE(f);
+    expect_within_sigmas(s, calibrate(simulate(s), options));
+  }
+}
+
+// In the camera frame through the estimate: the axes are then turned by the centre's error.
+TEST(Calibrate, TellsAxesInTheFrameThroughItsCentre) {
+  for (const double f : {4000.0, 30000.0}) {
+    Simulation s = small_simulation(33);
+    s.focal_length = f;
+    s.radial_distortion = 0.01 * f * f / (1100.0 * 1100.0);
+    s.optical_centre_offset_px = {-12, 17};
+    CalibrationOptions options;
+    options.centre_sigma_px = 19;
+    const CalibrationResult result = calibrate(simulate(s), options);
+    SCOPED_TRACE(f);
+    ASSERT_TRUE(result.ok()) << result.message;
+    const Calibration c = with_frame_through_centre(result.calibration);
+    EXPECT_EQ(parameter_sigma(c, Parameter::kCentreU), 0);
+    Eigen::Matrix<double, kParameterCount, 1> error = calibration_error(s, c);
+    error -= axes_by_centre(c) * error.segment<2>(index(Parameter::kCentreU));
+    for (const Parameter p :
+         {Parameter::kFocalLength, Parameter::kRadialDistortion, Parameter::kPanAxis0,
+          Parameter::kPanAxis1, Parameter::kTiltAxis0, Parameter::kTiltAxis1}) {
+      EXPECT_LT(std::abs(error[index(p)]), kSigmas * parameter_sigma(c, p)) << to_string(p);
+    }
+    // The middle as exact, with what the centre's error does.
+    const CalibrationResult exact = calibrate(simulate(s));
+    ASSERT_TRUE(exact.ok()) << exact.message;
+    const Calibration middle = with_centre_error(exact.calibration, result.calibration);
+    error = calibration_error(s, middle);
+    for (const Parameter p : {Parameter::kFocalLength, Parameter::kRadialDistortion}) {
+      EXPECT_LT(std::abs(error[index(p)]), kSigmas * parameter_sigma(middle, p)) << to_string(p);
+    }
+  }
 }
 
 TEST(CalibrationOptions, TellOfEachParameterHowWellItIsKnownBefore) {

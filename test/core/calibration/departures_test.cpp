@@ -158,6 +158,7 @@ TEST(Departures, AFocalLengthThatDriftsIsNamed) {
   EXPECT_EQ(likeliest(result), "focal length drifts");
   EXPECT_GT(size_of_likeliest(result), 0.3);
   EXPECT_LT(size_of_likeliest(result), 0.9);
+  EXPECT_GT(relative_focal_length_sigma(result.calibration), 0.5e-3);
 }
 
 // The upper half of the scene.
@@ -187,6 +188,31 @@ TEST(Departures, DifferentDistancesAreNamed) {
             o->v_px += 0.05 / distance_m * from_middle[1];
           }});
   EXPECT_EQ(likeliest(result), "different distances");
+  const double sigma = parameter_sigma(result.calibration, Parameter::kFocalLength);
+  EXPECT_LT(std::abs(result.calibration.camera.focal_length - s.focal_length), 3 * sigma);
+  // Inverse distances of 1 / 10 to 1 / 30 are 0.06 with a spread of 0.02.
+  EXPECT_LT(sigma, 3 * 2.5 * 0.02 * 0.05 * s.focal_length);
+}
+
+// Neighbours at one distance: the trajectory follows them.
+TEST(Departures, DistancesThatChangeOverTheSceneAreInTheFocalLengthsSigma) {
+  const Simulation s = narrow_camera(9);
+  const double field = s.field_of_view();
+  const SimulatedRecording recording = test::simulate_with_truth(s);
+  const CalibrationResult result = calibrate_disturbed(
+      s, {{},
+          [&](double, const Eigen::Vector2d& from_middle, std::int64_t landmark,
+              CalibrationObservation* o) {
+            const Eigen::Vector3d& d = recording.landmarks[static_cast<std::size_t>(landmark)];
+            const double distance_m = 20 + 10 * std::sin(2 * d.y() / field) +
+                                      5 * std::sin(3 * d.z() / field) +
+                                      3 * std::sin(12.9898 * static_cast<double>(landmark));
+            o->u_px += 0.05 / distance_m * from_middle[0];
+            o->v_px += 0.05 / distance_m * from_middle[1];
+          }});
+  const double sigma = parameter_sigma(result.calibration, Parameter::kFocalLength);
+  EXPECT_LT(std::abs(result.calibration.camera.focal_length - s.focal_length), 3 * sigma);
+  EXPECT_LT(sigma, 0.01 * s.focal_length);
 }
 
 // One line for the contradiction, and one for each cause; nothing where there is nothing.
@@ -202,6 +228,12 @@ TEST(Departures, AreDescribedInWords) {
             "sigmas have grown to that");
   EXPECT_EQ(lines[1], "likeliest cause: play, 0.025 mrad; the sigmas have what it does");
   EXPECT_EQ(lines[2], "beside it: optical centre, 11 px; the sigmas have what it does");
+  quality.causes = {{"different distances", 270, 2, 1, "per mille of the focal length"}};
+  const auto of_depth = quality.describe_departures();
+  ASSERT_EQ(of_depth.size(), 3u);
+  EXPECT_EQ(of_depth[2],
+            "what is nearer than 50 m is seen where it is not, beyond the focal length's sigma, if "
+            "the lens's pupil lies 5 cm before or behind the axes");
 }
 
 }  // namespace

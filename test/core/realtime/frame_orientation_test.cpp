@@ -133,10 +133,22 @@ TEST(FrameOrientation, OrientationCovarianceFollowsMotionAndCalibration) {
   const auto numeric = test::numeric_jacobian<3, 9>(turned, Matrix<double, 9, 1>::Constant(1e-3));
   ASSERT_EQ(numeric.evaluated, 9 * 4);
   const Matrix<double, 3, 2> J_angle = numeric.J.leftCols<2>();
-  const Matrix<double, 3, 7> J_mount = numeric.J.rightCols<7>();
+  Sensitivity<3> J_calibration = Sensitivity<3>::Zero();
+  J_calibration.rightCols<7>() = numeric.J.rightCols<7>();
+  // The turn from where the picture's middle looked to where it looks with another centre.
+  const Vector2<double> middle = calibration.camera.optical_centre();
+  for (int i = 0; i < 2; ++i) {
+    Camera<double> changed = calibration.camera;
+    (i == 0 ? changed.centre_u : changed.centre_v) += 1e-3;
+    Vector3<double> before;
+    Vector3<double> after;
+    ASSERT_EQ(unproject(calibration.camera, middle, &before), ProjectionStatus::kOk);
+    ASSERT_EQ(unproject(changed, middle, &after), ProjectionStatus::kOk);
+    J_calibration.col(index(Parameter::kCentreU) + i) = before.cross(after) / 1e-3;
+  }
   const Matrix3<double> expected =
       J_angle * motion_covariance.topLeftCorner<2, 2>() * J_angle.transpose() +
-      J_mount * calibration.covariance.bottomRightCorner<7, 7>() * J_mount.transpose();
+      J_calibration * calibration.covariance * J_calibration.transpose();
   EXPECT_LT((frame.orientation_covariance - expected).norm(), 1e-7 * expected.norm());
 }
 

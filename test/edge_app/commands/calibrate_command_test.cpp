@@ -152,6 +152,29 @@ TEST_F(CalibrateCommand, StatesAndUsesThePriorsOfItsOptions) {
   EXPECT_EQ(priors["pan_scale"]["sigma"], 0.001);
 }
 
+TEST_F(CalibrateCommand, FindsTheOpticalCentreUnlessItIsStatedExact) {
+  test::Simulation simulation;
+  simulation.radial_distortion = 0.4;  // 3 % in the corner
+  simulation.optical_centre_offset_px = {24, -15};
+  record(simulation);
+  ASSERT_EQ(calibrate_command({path()}).exit_code, 0);
+  const Calibration found = stored();
+  EXPECT_NEAR(found.camera.centre_u, 24, 5);
+  EXPECT_NEAR(found.camera.centre_v, -15, 5);
+  EXPECT_EQ(parameter_sigma(found, Parameter::kCentreU), 0);
+  EXPECT_NEAR(found.camera.distortion.radial, 0.4,
+              5 * parameter_sigma(found, Parameter::kRadialDistortion));
+  ASSERT_EQ(calibrate_command({path(), "--centre-sigma", "0"}).exit_code, 0);
+  EXPECT_FALSE(stored().has_centre());
+}
+
+TEST_F(CalibrateCommand, TakesTheMiddleForTheCentreWhereTheDataShowNoOther) {
+  record(test::Simulation());
+  ASSERT_EQ(calibrate_command({path()}).exit_code, 0);
+  EXPECT_FALSE(stored().has_centre());
+  expect_near_truth(stored(), simulation_);
+}
+
 // The lens.yaml of the simulated camera, for images of this size.
 std::string lens_file_of(const test::Simulation& simulation, int width, int height,
                          double line_delay_sigma) {
@@ -465,6 +488,7 @@ TEST_F(CalibrateCommand, BadOptionsAreOneLineAndExitCodeTwo) {
                                                     {path(), "--focal-length", "-4000"},
                                                     {path(), "--line-delay", "nan"},
                                                     {path(), "--scale-sigma", "2"},
+                                                    {path(), "--centre-sigma", "-1"},
                                                     {path("none")}}) {
     const Result result = calibrate_command(arguments);
     EXPECT_EQ(result.exit_code, 2) << ::testing::PrintToString(arguments);

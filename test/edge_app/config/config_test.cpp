@@ -259,7 +259,7 @@ TEST_F(ConfigTest, EveryKeyIsRead) {
           "           password_env: ALIDADE_TEST_PASSWORD, timeout_s: 0.5, max_backoff_s: 9,\n"
           "           angle_sigma_rad: 2e-5, angle_quantum_rad: 1e-4}\n"
           "camera: {focal_length_px: 30000, aspect: 1.01, radial_distortion: -2.5,\n"
-          "         line_delay_s: 1.5e-5, upside_down: true, zoom: fixed}\n"
+          "         centre_sigma_px: 2, line_delay_s: 1.5e-5, upside_down: true, zoom: fixed}\n"
           "calibration: {file: /etc/c.yaml, prior: bench/lens.yaml, auto: false, zoom_tolerance: "
           "2.5, clock_offset_sigma_ms: 20}\n"
           "realtime: {mode: PT, priority: 60, cpu: 3, lock_memory: true, max_extrapolation_s: "
@@ -295,6 +295,7 @@ TEST_F(ConfigTest, EveryKeyIsRead) {
   EXPECT_EQ(config_.camera.focal_length_px, 30000);
   EXPECT_EQ(config_.camera.aspect, 1.01);
   EXPECT_EQ(config_.camera.radial_distortion, -2.5);
+  EXPECT_EQ(config_.camera.centre_sigma_px, 2);
   EXPECT_EQ(config_.camera.line_delay_s, 1.5e-5);
   EXPECT_TRUE(config_.camera.upside_down);
   EXPECT_EQ(config_.calibration.file, "/etc/c.yaml");

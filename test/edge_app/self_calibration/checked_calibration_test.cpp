@@ -117,6 +117,29 @@ TEST(CheckedCalibration, WhatIsKnownMakesItSharper) {
   EXPECT_LT(refined.result.calibration.covariance(f, f), first.result.calibration.covariance(f, f));
 }
 
+TEST(CheckedCalibration, WhatIsKnownKeepsItsFreeCentre) {
+  const test::Simulation s = test::arrival_stamped_camera();
+  const CalibrationSession session = session_of(s, 1);
+  CheckedCalibrationOptions options = session_options(s);
+  options.adjustment.centre_sigma_px = 19;
+  const Calibration first = calibrate_session(session, options, nullptr).result.calibration;
+  const KnownCalibration known{first, true};
+  const CheckedCalibration refined = calibrate_session(session, options, &known);
+  ASSERT_THAT(refined.refusal, IsEmpty());
+  const Calibration& c = refined.result.calibration;
+  EXPECT_EQ(c.camera.centre_u, first.camera.centre_u);
+  for (const Parameter p : {Parameter::kCentreU, Parameter::kCentreV}) {
+    EXPECT_NEAR(parameter_sigma(c, p), parameter_sigma(first, p), 1e-9);
+  }
+  EXPECT_LT(parameter_sigma(c, Parameter::kFocalLength),
+            parameter_sigma(first, Parameter::kFocalLength));
+  // The axes follow the centre as before.
+  const int axis = index(Parameter::kPanAxis0);
+  const int centre = index(Parameter::kCentreU);
+  EXPECT_NEAR(c.covariance(axis, centre), first.covariance(axis, centre),
+              0.02 * std::abs(first.covariance(axis, centre)));
+}
+
 TEST(CheckedCalibration, TakesWhatIsKnownOfTheCameraBeforehandOnceAndSaysWhatContradicts) {
   const test::Simulation s = test::arrival_stamped_camera();
   const CalibrationSession session = session_of(s, 1);

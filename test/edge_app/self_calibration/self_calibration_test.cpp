@@ -184,6 +184,45 @@ TEST(SelfCalibration, LaterMotionRefinesWhatIsKnown) {
   EXPECT_LT(after.covariance(0, 0), before.covariance(0, 0));
 }
 
+TEST(SelfCalibration, FindsTheOpticalCentreAndKeepsIt) {
+  test::Simulation s = camera();
+  s.radial_distortion = 0.4;  // 3 % in the corner
+  s.optical_centre_offset_px = {24, -15};
+  SelfCalibrationOptions options = options_for(s);
+  options.adjustment.centre_sigma_px = 19;
+  SelfCalibration calibration(options, nullptr);
+  const auto first = feed(&calibration, s, {});
+  ASSERT_FALSE(first.empty());
+  const Calibration& before = first.front().calibration->calibration;
+  EXPECT_NEAR(before.camera.centre_u, 24, 3);
+  EXPECT_NEAR(before.camera.centre_v, -15, 3);
+  EXPECT_EQ(parameter_sigma(before, Parameter::kCentreU), 0);
+  EXPECT_NEAR(before.camera.distortion.radial, 0.4,
+              5 * parameter_sigma(before, Parameter::kRadialDistortion));
+  test::Simulation later = s;
+  later.seed = 4;
+  const auto refined = feed(
+      &calibration, later,
+      {FrameTracks::Tracker::kOe, {}, 20, false, std::numeric_limits<double>::infinity(), 1000});
+  ASSERT_FALSE(refined.empty());
+  const Calibration& after = refined.back().calibration->calibration;
+  EXPECT_EQ(after.camera.centre_offset(), before.camera.centre_offset());
+  EXPECT_LT(after.covariance(0, 0), before.covariance(0, 0));
+  EXPECT_THAT(calibration.take_messages(),
+              Not(Contains(HasSubstr("the camera is not what the calibration says"))));
+}
+
+TEST(SelfCalibration, TakesTheMiddleForTheCentreUnlessItIsShown) {
+  const test::Simulation s = camera();
+  SelfCalibrationOptions options = options_for(s);
+  options.adjustment.centre_sigma_px = 19;
+  SelfCalibration calibration(options, nullptr);
+  const auto published = feed(&calibration, s, {});
+  ASSERT_FALSE(published.empty());
+  EXPECT_FALSE(published.back().calibration->calibration.has_centre());
+  expect_truth(s, published.back().calibration->calibration);
+}
+
 TEST(SelfCalibration, MakesAFreshCalibrationOfTheMotionSinceItWasAskedFor) {
   const test::Simulation s = camera();
   const SelfCalibrationOptions options = options_for(s);
