@@ -14,9 +14,9 @@ namespace {
 constexpr int kAngleKnots = 13;
 constexpr int kTimeKnots = 6;
 constexpr int kMostFound = 4;
-constexpr double kHuber = 3;        // sigmas of noise; a residual beyond counts less
-constexpr double kNotSeen = 1e-6;   // share of a column that nothing else explains
-constexpr int kFrameErrors = 4;     // pan, tilt, their rates
+constexpr double kHuber = 3;       // sigmas of noise; a residual beyond counts less
+constexpr double kNotSeen = 1e-6;  // share of a column that nothing else explains
+constexpr int kFrameErrors = 4;    // pan, tilt, their rates
 constexpr double kNoRange_rad = 1e-3;
 
 // A column that shifts a frame's angles or parameter by a known number.
@@ -27,12 +27,10 @@ struct FrameColumn {
 
 struct DepartureColumns {
   Departure departure;
-  std::vector<int> parameters;         // of Parameter; or
+  std::vector<int> parameters;  // of Parameter; or
   std::vector<FrameColumn> columns;
   std::vector<double> at;
-  [[nodiscard]] int count() const {
-    return static_cast<int>(parameters.size() + columns.size());
-  }
+  [[nodiscard]] int count() const { return static_cast<int>(parameters.size() + columns.size()); }
 };
 
 // Piecewise linear, 1 at knot k and 0 at its neighbours.
@@ -233,7 +231,7 @@ class PairEquations {
 
   // Row pair of one place: errors of both frames, what is shared, departures, r.
   [[nodiscard]] Eigen::Matrix<double, 2, Eigen::Dynamic> row(const PairRows& pair,
-                                                            const PlaceRow& place) const {
+                                                             const PlaceRow& place) const {
     Eigen::Matrix<double, 2, Eigen::Dynamic> out(2, 2 * kFrameErrors + shared() + columns_ + 1);
     out.leftCols<kFrameErrors>() = place.J_first * frame_roots_[pair.first];
     out.middleCols<kFrameErrors>(kFrameErrors) = place.J_second * frame_roots_[pair.second];
