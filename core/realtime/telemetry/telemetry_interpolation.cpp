@@ -239,14 +239,11 @@ bool interpolate(const TelemetryNoise& noise, const TelemetryKnot* knots, int co
   // the rate is 0.
   covariance.diagonal().head<2>() +=
       0.75 * shared_time_variance * shared_time_variance * acceleration_square;
-  constexpr double kStep = 1.5;                        // readings differ by whole steps
   Vector2<double> rounding = Vector2<double>::Zero();  // rad^2
   for (int axis = 0; axis < 2; ++axis) {
-    // If an axis moves less than a step or turns about within one, samples are rounded alike, and
-    // averaging does not help.
-    const double readings =
-        angles.row(axis).leftCols(count).maxCoeff() - angles.row(axis).leftCols(count).minCoeff();
-    if (std::abs(rate[axis]) * span_s < noise.resolution || readings < kStep * noise.resolution) {
+    // If an axis moves less than a step, all its samples are rounded alike, and averaging does not
+    // help.
+    if (std::abs(rate[axis]) * span_s < noise.resolution) {
       rounding[axis] = noise.resolution * noise.resolution / 12;
       covariance(axis, axis) += rounding[axis];
     }
