@@ -134,7 +134,8 @@ void add_verify(CLI::App& app, int* exit_code) {
   command->add_flag("--json", options->json, "The result on stdout as one line of JSON");
   command->footer(
       "Exit status: 0 the sigmas hold, 1 they are contradicted, 2 nothing could be judged. Record "
-      "for a minute while the head pans and tilts over a few fields of view, to and fro, at several "
+      "for a minute while the head pans and tilts over a few fields of view, to and fro, at "
+      "several "
       "speeds.");
   command->callback([options, exit_code] { *exit_code = verify_calibration(*options); });
 }

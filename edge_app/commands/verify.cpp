@@ -139,11 +139,11 @@ int verify_calibration(const VerifyOptions& options) {
   try {
     const Verification verification = judge_recording(options);
     OutputDirectory directory(options.directory, options.recording);
-    directory.add("report", "verification.html",
-                  verification_report(
-                      verification,
-                      {options.recording, ALIDADE_VERSION,
-                       fmt::format("{:%Y-%m-%d %H:%M} UTC", fmt::gmtime(std::time(nullptr)))}));
+    directory.add(
+        "report", "verification.html",
+        verification_report(
+            verification, {options.recording, ALIDADE_VERSION,
+                           fmt::format("{:%Y-%m-%d %H:%M} UTC", fmt::gmtime(std::time(nullptr)))}));
     std::fputs(options.json ? verification_json(verification, directory.files()).c_str()
                             : verification_text(verification).c_str(),
                stdout);

@@ -21,8 +21,8 @@ namespace alidade {
 struct PairMean {
   std::size_t first = 0;
   std::size_t second = 0;
-  Vector2<double> residual = Vector2<double>::Zero();    // px
-  Matrix2<double> noise = Matrix2<double>::Zero();       // px^2, of the places
+  Vector2<double> residual = Vector2<double>::Zero();  // px
+  Matrix2<double> noise = Matrix2<double>::Zero();     // px^2, of the places
   Matrix<double, 2, 4> J_first = Matrix<double, 2, 4>::Zero();
   Matrix<double, 2, 4> J_second = Matrix<double, 2, 4>::Zero();
   Sensitivity<2> P = Sensitivity<2>::Zero();
@@ -31,8 +31,8 @@ struct PairMean {
 struct ClaimResult {
   int pairs = 0;
   int frames = 0;
-  double freedom = 0;   // independent numbers behind the ratio; two a pair at most
-  double rms_px = 0;    // of the lengths of y_p
+  double freedom = 0;  // independent numbers behind the ratio; two a pair at most
+  double rms_px = 0;   // of the lengths of y_p
   double rms_deg = 0;
   double claimed_px = 0;  // what the covariances make of it
   double ratio = 0;

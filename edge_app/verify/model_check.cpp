@@ -14,9 +14,9 @@ namespace {
 constexpr int kAngleKnots = 13;
 constexpr int kTimeKnots = 6;
 constexpr std::size_t kMostFound = 4;
-constexpr double kHuber = 3;        // sigmas of noise; a residual beyond counts less
-constexpr double kNotSeen = 1e-9;   // share of a column that nothing else explains
-constexpr int kFrameErrors = 4;     // pan, tilt, their rates
+constexpr double kHuber = 3;          // sigmas of noise; a residual beyond counts less
+constexpr double kNotSeen = 1e-9;     // share of a column that nothing else explains
+constexpr int kFrameErrors = 4;       // pan, tilt, their rates
 constexpr double kLeastRange = 1e-3;  // rad or s, of a curve
 
 // A column that shifts a frame's angles or parameter by a known number.
@@ -27,12 +27,10 @@ struct FrameColumn {
 
 struct DepartureColumns {
   Departure departure;
-  std::vector<int> parameters;         // of Parameter; or
+  std::vector<int> parameters;  // of Parameter; or
   std::vector<FrameColumn> columns;
   std::vector<double> at;
-  [[nodiscard]] int count() const {
-    return static_cast<int>(parameters.size() + columns.size());
-  }
+  [[nodiscard]] int count() const { return static_cast<int>(parameters.size() + columns.size()); }
 };
 
 // Piecewise linear, 1 at knot k and 0 at its neighbours.
@@ -189,8 +187,7 @@ class PairEquations {
       left.row(i) << sums_.block(row, 0, 1, unknowns()), columns_of(free_, row, 1);
       right[i] = sums_(row, last());
     }
-    for (int i = 0; i < n; ++i)
-      own.row(i) = columns_of(at, at[static_cast<std::size_t>(i)], 1);
+    for (int i = 0; i < n; ++i) own.row(i) = columns_of(at, at[static_cast<std::size_t>(i)], 1);
     const Eigen::VectorXd s = right - left * solution_;
     const Eigen::MatrixXd explained = information_.solve(left.transpose());
     const Eigen::MatrixXd V = own - left * explained;
@@ -265,7 +262,7 @@ class PairEquations {
 
   // Row pair of one place: errors of both frames, what is shared, departures, r.
   [[nodiscard]] Eigen::Matrix<double, 2, Eigen::Dynamic> row(const PairRows& pair,
-                                                            const PlaceRow& place) const {
+                                                             const PlaceRow& place) const {
     Eigen::Matrix<double, 2, Eigen::Dynamic> out(2, 2 * kFrameErrors + shared() + columns_ + 1);
     out.leftCols<kFrameErrors>() = place.J_first * frame_roots_[pair.first];
     out.middleCols<kFrameErrors>(kFrameErrors) = place.J_second * frame_roots_[pair.second];

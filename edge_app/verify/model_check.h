@@ -28,7 +28,7 @@ enum class Departure : int {
   kPanAxis,
   kTiltAxis,
   kClockOffset,
-  kPanGear,    // telemetry's pan is off by a function of the angle
+  kPanGear,  // telemetry's pan is off by a function of the angle
   kTiltGear,
   kPanPlay,
   kTiltPlay,
@@ -41,15 +41,15 @@ inline constexpr int kDepartureCount = static_cast<int>(Departure::kCount);
 
 struct DepartureTest {
   Departure departure = Departure::kFocalLength;
-  int freedom = 0;         // numbers of it that the recording shows; 0: none
-  double chi_square = 0;   // for `freedom`
-  double log_chance = 0;   // of so much, if there is no such departure
-  double scatter = 1;      // of the variance, by what a pair's places share; divides chi_square
+  int freedom = 0;        // numbers of it that the recording shows; 0: none
+  double chi_square = 0;  // for `freedom`
+  double log_chance = 0;  // of so much, if there is no such departure
+  double scatter = 1;     // of the variance, by what a pair's places share; divides chi_square
   // Size by this recording alone, and its sigma: px, 1, rad or s; of curves at their knots, in order
   // of `at`. Truth minus calibration; telemetry minus truth for gears and drifts of its zero.
   std::vector<double> size, sigma;
-  std::vector<double> at;     // rad or s; empty: not a curve
-  double claimed_sigma = 0;   // of a parameter, by the calibration
+  std::vector<double> at;    // rad or s; empty: not a curve
+  double claimed_sigma = 0;  // of a parameter, by the calibration
 };
 
 // Tests of all departures; and of those that were found, in the order of what they explain, each

@@ -10,8 +10,7 @@ bool linearise(const FrameOrientation& first, const FrameOrientation& second,
   Matrix<double, 3, kParameterCount> J_d_parameters;
   if (rolling_shutter_unproject(first.calibration.camera, first.calibration.mechanics,
                                 first.calibration.line_delay, first.motion(), match.first, &d,
-                                nullptr, &J_d_motion,
-                                &J_d_parameters) != ProjectionStatus::kOk) {
+                                nullptr, &J_d_motion, &J_d_parameters) != ProjectionStatus::kOk) {
     return false;
   }
   Vector2<double> expected;

@@ -16,10 +16,10 @@ namespace alidade {
 enum class OrientationFrom { kTelemetry, kAllSamples, kLandmarks };
 
 struct PlaceRow {
-  Vector2<double> at;           // px, in the second picture
-  Vector2<double> moved;        // px, from the first picture to the second
-  Vector2<double> residual;     // px
-  Matrix2<double> covariance;   // px^2, noise
+  Vector2<double> at;          // px, in the second picture
+  Vector2<double> moved;       // px, from the first picture to the second
+  Vector2<double> residual;    // px
+  Matrix2<double> covariance;  // px^2, noise
   Matrix<double, 2, 4> J_first, J_second;
   Sensitivity<2> P_first, P_second;
 };

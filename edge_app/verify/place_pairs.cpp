@@ -13,8 +13,8 @@
 namespace alidade {
 namespace {
 
-constexpr std::size_t kPartners = 8;   // of a frame, at most
-constexpr std::size_t kPlaces = 24;    // looked for in a pair
+constexpr std::size_t kPartners = 8;  // of a frame, at most
+constexpr std::size_t kPlaces = 24;   // looked for in a pair
 constexpr std::size_t kLeastPlaces = 6;
 constexpr double kLeastOverlap = 0.3;  // of the picture's width and height
 constexpr double kBorder_px = 14;
@@ -27,7 +27,8 @@ constexpr double kNoOutlier_px = 0.5;
 
 // What says where a frame looks while places are searched for.
 const FrameOrientation& best_of(const SeenFrame& frame) {
-  return frame.by_landmarks.mode == OrientationMode::kOe ? frame.by_landmarks : frame.by_all_samples;
+  return frame.by_landmarks.mode == OrientationMode::kOe ? frame.by_landmarks
+                                                         : frame.by_all_samples;
 }
 
 std::optional<Vector2<double>> transfer(const FrameOrientation& from, const FrameOrientation& to,

@@ -15,9 +15,9 @@ namespace alidade {
 inline constexpr double kLeastGap_s = 1;
 
 struct PlaceMatch {
-  Vector2<double> first;        // px, where it is in the first picture
-  Vector2<double> second;       // px, where it was found in the second
-  Matrix2<double> covariance;   // px^2, of `second`, by noise of both pictures
+  Vector2<double> first;       // px, where it is in the first picture
+  Vector2<double> second;      // px, where it was found in the second
+  Matrix2<double> covariance;  // px^2, of `second`, by noise of both pictures
 };
 
 struct PlacePair {

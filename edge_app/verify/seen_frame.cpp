@@ -10,7 +10,7 @@ constexpr std::size_t kMostFrames = 160;
 constexpr std::size_t kMostBytes = std::size_t{256} << 20;
 constexpr double kClearSigmas = 6;  // 4 sigmas of a difference of two angles
 
-constexpr double kSettling_s = 1;      // until the clocks know the frames' times
+constexpr double kSettling_s = 1;  // until the clocks know the frames' times
 
 bool is_clear(RecordStatus status) {
   return status == RecordStatus::kOk || status == RecordStatus::kClockWarmingUp;

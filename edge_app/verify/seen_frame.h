@@ -18,8 +18,8 @@
 namespace alidade {
 
 struct SeenFrame {
-  double time_s = 0;        // s, image clock; capture of row 0
-  double time_sigma_s = 0;  // s; may be shared with all other frames
+  double time_s = 0;                // s, image clock; capture of row 0
+  double time_sigma_s = 0;          // s; may be shared with all other frames
   FrameOrientation by_telemetry;    // by the samples that had come when the frame came
   FrameOrientation by_all_samples;  // by those after it, too
   FrameOrientation by_landmarks;    // mode kNone: landmarks did not hold

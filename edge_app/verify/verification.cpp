@@ -102,9 +102,10 @@ std::string sentence_of(const ClaimComparison& comparison) {
   const std::string where =
       fmt::format("{}, {}", name_of(comparison.kind), mode_of(comparison.from));
   if (comparison.verdict == Verdict::kNotJudged) {
-    return fmt::format("{}: not judged; {} pairs, worth {:.0f} independent numbers ({} and {:.0f} "
-                       "are needed)",
-                       where, r.pairs, r.freedom, kLeastPairs, kLeastFreedom);
+    return fmt::format(
+        "{}: not judged; {} pairs, worth {:.0f} independent numbers ({} and {:.0f} "
+        "are needed)",
+        where, r.pairs, r.freedom, kLeastPairs, kLeastFreedom);
   }
   return fmt::format(
       "{}: directions of the same place differ by {:.2f} times what sigma claims (95 %: {:.2f} to "
@@ -168,19 +169,19 @@ double motion_inflation(const VerifyInput& input, OrientationFrom from) {
 }
 
 struct Extent {
-  double pan = 0, tilt = 0;    // rad
-  double reversals = 0;        // of either axis
+  double pan = 0, tilt = 0;  // rad
+  double reversals = 0;      // of either axis
 };
 
 Extent extent_of(const std::vector<SeenFrame>& frames) {
   Extent out;
   if (frames.empty()) return out;
-  const auto [left, right] = std::minmax_element(
-      frames.begin(), frames.end(), [](const SeenFrame& a, const SeenFrame& b) {
+  const auto [left, right] =
+      std::minmax_element(frames.begin(), frames.end(), [](const SeenFrame& a, const SeenFrame& b) {
         return a.by_telemetry.angle.pan < b.by_telemetry.angle.pan;
       });
-  const auto [low, high] = std::minmax_element(
-      frames.begin(), frames.end(), [](const SeenFrame& a, const SeenFrame& b) {
+  const auto [low, high] =
+      std::minmax_element(frames.begin(), frames.end(), [](const SeenFrame& a, const SeenFrame& b) {
         return a.by_telemetry.angle.tilt < b.by_telemetry.angle.tilt;
       });
   out.pan = right->by_telemetry.angle.pan - left->by_telemetry.angle.pan;
@@ -218,8 +219,8 @@ const ClaimComparison* worst_claim(const Verification& verification) {
   for (const ClaimComparison& each : verification.claims) {
     if (each.verdict == Verdict::kNotJudged) continue;
     const bool is_worse =
-        worst == nullptr || (each.verdict == Verdict::kContradicted) >
-                                (worst->verdict == Verdict::kContradicted) ||
+        worst == nullptr ||
+        (each.verdict == Verdict::kContradicted) > (worst->verdict == Verdict::kContradicted) ||
         (each.verdict == worst->verdict && each.result.ratio > worst->result.ratio);
     if (is_worse) worst = &each;
   }
@@ -229,17 +230,19 @@ const ClaimComparison* worst_claim(const Verification& verification) {
 std::string summary_of(const Verification& v) {
   const ClaimComparison* worst = worst_claim(v);
   const std::string differ =
-      worst == nullptr ? ""
-                       : fmt::format("directions of the same place differ by {:.2f} times what "
-                                     "sigma claims (limit {:.2f}; {}, {})",
-                                     worst->result.ratio,
-                                     worst->result.ratio / std::max(1e-9, worst->result.low),
-                                     name_of(worst->kind), mode_of(worst->from));
+      worst == nullptr
+          ? ""
+          : fmt::format(
+                "directions of the same place differ by {:.2f} times what "
+                "sigma claims (limit {:.2f}; {}, {})",
+                worst->result.ratio, worst->result.ratio / std::max(1e-9, worst->result.low),
+                name_of(worst->kind), mode_of(worst->from));
   switch (v.verdict) {
     case Verdict::kNotJudged:
-      return fmt::format("not judged: {} pairs of pictures show the same places again ({} are "
-                         "needed)",
-                         v.pairs, kLeastPairs);
+      return fmt::format(
+          "not judged: {} pairs of pictures show the same places again ({} are "
+          "needed)",
+          v.pairs, kLeastPairs);
     case Verdict::kHolds:
       return "sigmas hold: " + differ;
     case Verdict::kContradicted:
@@ -361,9 +364,8 @@ std::string size_of(const DepartureTest& test) {
       return one(kMicro, " us/row");
     case Departure::kPanAxis:
     case Departure::kTiltAxis:
-      return fmt::format("off by ({:.3g}, {:.3g}) +- ({:.2g}, {:.2g}) mrad",
-                         kMilli * test.size[0], kMilli * test.size[1], kMilli * test.sigma[0],
-                         kMilli * test.sigma[1]);
+      return fmt::format("off by ({:.3g}, {:.3g}) +- ({:.2g}, {:.2g}) mrad", kMilli * test.size[0],
+                         kMilli * test.size[1], kMilli * test.sigma[0], kMilli * test.sigma[1]);
     case Departure::kClockOffset:
       return one(kMilli, " ms");
     case Departure::kPanPlay:

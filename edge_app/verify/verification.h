@@ -17,9 +17,9 @@
 namespace alidade {
 
 enum class Verdict {
-  kHolds,        // no comparison contradicts the sigmas
+  kHolds,  // no comparison contradicts the sigmas
   kContradicted,
-  kNotJudged     // too few returns
+  kNotJudged  // too few returns
 };
 [[nodiscard]] const char* to_string(Verdict verdict);
 
@@ -55,7 +55,7 @@ struct Verification {
   std::vector<std::string> advice;  // what motion would serve
   int pairs = 0;
   int places = 0;
-  double noise_ratio = 1;  // of the pictures, see ModelCheckResult
+  double noise_ratio = 1;   // of the pictures, see ModelCheckResult
   double chance_limit = 0;  // of each comparison
   std::vector<ClaimComparison> claims;
   std::vector<ModelComparison> model;

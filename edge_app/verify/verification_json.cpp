@@ -55,7 +55,8 @@ std::string verification_json(const Verification& verification,
   json["picture_noise_ratio"] = verification.noise_ratio;
   json["chance_limit"] = verification.chance_limit;
   json["returns"] = ordered_json::array();
-  for (const ClaimComparison& claim : verification.claims) json["returns"].push_back(to_json(claim));
+  for (const ClaimComparison& claim : verification.claims)
+    json["returns"].push_back(to_json(claim));
   json["model"] = ordered_json::array();
   for (const ModelComparison& comparison : verification.model) {
     ordered_json each = to_json(comparison.test);

@@ -80,12 +80,13 @@ std::string model_table(const Verification& v) {
         name_of(test.departure), size_of(test), test.chi_square, test.freedom,
         std::exp(test.log_chance), to_string(comparison.verdict));
   }
-  return out + fmt::format(
-                   "</tbody>\n</table></div>\n<p class=\"soft\">A departure is contradicted below a "
-                   "chance of {:.1g}, so that one in a hundred calibrations with true sigmas is "
-                   "contradicted at most. Sizes are what this recording alone shows, whatever the "
-                   "calibration claims.</p>\n",
-                   v.chance_limit);
+  return out +
+         fmt::format(
+             "</tbody>\n</table></div>\n<p class=\"soft\">A departure is contradicted below a "
+             "chance of {:.1g}, so that one in a hundred calibrations with true sigmas is "
+             "contradicted at most. Sizes are what this recording alone shows, whatever the "
+             "calibration claims.</p>\n",
+             v.chance_limit);
 }
 
 // A departure over angle or time, each knot with its sigma.
@@ -100,8 +101,7 @@ std::string curve_plot(const DepartureTest& test, const DepartureTest* found, do
   for (std::size_t i = 0; i < shown.size.size(); ++i) {
     reach = std::max(reach, unit_y * (std::abs(shown.size[i] - mean) + 2 * shown.sigma[i]));
   }
-  SvgPlot plot(kHalf_px, kHeight_px,
-               {unit_x * shown.at.front(), unit_x * shown.at.back(), x_label},
+  SvgPlot plot(kHalf_px, kHeight_px, {unit_x * shown.at.front(), unit_x * shown.at.back(), x_label},
                {-1.1 * reach, 1.1 * reach, y_label});
   plot.level(0);
   std::vector<PlotPoint> line;
@@ -182,23 +182,24 @@ std::string lens_plot(const Verification& v, int axis) {
                {-1.1 * reach, 1.1 * reach, axis == 0 ? "residual of u, px" : "residual of v, px"});
   plot.level(0);
   plot.dots(points, "a");
-  return html_figure("<b>Corner against centre.</b> Places of OE mode's pairs, without what a pair "
-                     "has in common: a slope or a bow is the lens",
-                     plot.svg("residuals over the picture"));
+  return html_figure(
+      "<b>Corner against centre.</b> Places of OE mode's pairs, without what a pair "
+      "has in common: a slope or a bow is the lens",
+      plot.svg("residuals over the picture"));
 }
 
 }  // namespace
 
 std::string verification_report(const Verification& v, const VerificationOrigin& origin) {
-  std::string body =
-      fmt::format("<p class=\"soft\">alidade {}, {}</p>\n<div class=\"verdict{}\"><strong>{}"
-                  "</strong><p>{}</p></div>\n",
-                  escape_html(origin.version), escape_html(origin.date),
-                  v.verdict == Verdict::kHolds ? "" : " weak",
-                  v.verdict == Verdict::kHolds          ? "The sigmas hold"
-                  : v.verdict == Verdict::kContradicted ? "The sigmas are contradicted"
-                                                        : "Not judged",
-                  escape_html(v.sentence));
+  std::string body = fmt::format(
+      "<p class=\"soft\">alidade {}, {}</p>\n<div class=\"verdict{}\"><strong>{}"
+      "</strong><p>{}</p></div>\n",
+      escape_html(origin.version), escape_html(origin.date),
+      v.verdict == Verdict::kHolds ? "" : " weak",
+      v.verdict == Verdict::kHolds          ? "The sigmas hold"
+      : v.verdict == Verdict::kContradicted ? "The sigmas are contradicted"
+                                            : "Not judged",
+      escape_html(v.sentence));
   body += fmt::format(
       "<ul class=\"facts\">\n<li><b>{}</b>pairs of pictures</li>\n<li><b>{}</b>places found again"
       "</li>\n<li><b>{:.2f}</b>picture noise / stated noise</li>\n</ul>\n",

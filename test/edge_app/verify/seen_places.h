@@ -21,7 +21,8 @@ struct SeenPlaces {
 
 struct PlaceErrors {
   Eigen::Matrix<double, kParameterCount, 1> parameters =
-      Eigen::Matrix<double, kParameterCount, 1>::Zero();  // truth minus calibration, and what is drawn
+      Eigen::Matrix<double, kParameterCount,
+                    1>::Zero();  // truth minus calibration, and what is drawn
   double pan_gear_rad = 0;   // telemetry minus truth: times the sine of 3 periods over the range
   double tilt_play_rad = 0;  // b of an encoder on the motor
   double growth = 1;         // of the frames' errors against their covariance
@@ -55,12 +56,11 @@ inline Calibration moved(const Calibration& from,
   out.camera.centre_u += by[index(Parameter::kCentreU)];
   out.camera.centre_v += by[index(Parameter::kCentreV)];
   out.line_delay += by[index(Parameter::kLineDelay)];
-  out.mechanics.pan_axis =
-      direction_plus(out.mechanics.pan_axis, {by[index(Parameter::kPanAxis0)],
-                                              by[index(Parameter::kPanAxis1)]});
+  out.mechanics.pan_axis = direction_plus(
+      out.mechanics.pan_axis, {by[index(Parameter::kPanAxis0)], by[index(Parameter::kPanAxis1)]});
   out.mechanics.tilt_axis =
-      direction_plus(out.mechanics.tilt_axis, {by[index(Parameter::kTiltAxis0)],
-                                               by[index(Parameter::kTiltAxis1)]});
+      direction_plus(out.mechanics.tilt_axis,
+                     {by[index(Parameter::kTiltAxis0)], by[index(Parameter::kTiltAxis1)]});
   return out;
 }
 
