@@ -13,11 +13,11 @@ namespace {
 
 constexpr int kAngleKnots = 13;
 constexpr int kTimeKnots = 6;
-constexpr int kMostFound = 4;
-constexpr double kHuber = 3;       // sigmas of noise; a residual beyond counts less
-constexpr double kNotSeen = 1e-6;  // share of a column that nothing else explains
-constexpr int kFrameErrors = 4;    // pan, tilt, their rates
-constexpr double kNoRange_rad = 1e-3;
+constexpr std::size_t kMostFound = 4;
+constexpr double kHuber = 3;          // sigmas of noise; a residual beyond counts less
+constexpr double kNotSeen = 1e-9;     // share of a column that nothing else explains
+constexpr int kFrameErrors = 4;       // pan, tilt, their rates
+constexpr double kLeastRange = 1e-3;  // rad or s, of a curve
 
 // A column that shifts a frame's angles or parameter by a known number.
 struct FrameColumn {
@@ -45,9 +45,21 @@ std::vector<double> knots_over(double low, double high, int count) {
   return out;
 }
 
+// Of a curve over x, what no polynomial of this degree (0 or 1) over the frames explains: the mean
+// of f is the focal length, and the slope of a gear is a scale.
+void take_out(int degree, const std::vector<double>& x, std::vector<double>* y) {
+  const auto n = static_cast<int>(x.size());
+  const double middle = (x.front() + x.back()) / 2;
+  Eigen::MatrixXd A(n, degree + 1);
+  A.col(0).setOnes();
+  for (int i = 0; degree > 0 && i < n; ++i) A(i, 1) = x[static_cast<std::size_t>(i)] - middle;
+  Eigen::Map<Eigen::VectorXd> values(y->data(), n);
+  values -= (A * A.colPivHouseholderQr().solve(values)).eval();
+}
+
 template <class ValueOf>
 DepartureColumns curve(Departure departure, FrameColumn::What what, double sign, int knots,
-                       const std::vector<SeenFrame>& frames, const ValueOf& value_of) {
+                       int degree, const std::vector<SeenFrame>& frames, const ValueOf& value_of) {
   DepartureColumns out{departure, {}, {}, {}};
   double low = std::numeric_limits<double>::infinity();
   double high = -low;
@@ -55,12 +67,14 @@ DepartureColumns curve(Departure departure, FrameColumn::What what, double sign,
     low = std::min(low, value_of(frame));
     high = std::max(high, value_of(frame));
   }
-  if (!(high - low > kNoRange_rad)) return out;
+  if (!(high - low > kLeastRange)) return out;
+  std::vector<double> x;
+  for (const SeenFrame& frame : frames) x.push_back(value_of(frame));
   out.at = knots_over(low, high, knots);
   for (std::size_t k = 0; k < out.at.size(); ++k) {
     FrameColumn column{what, {}};
-    for (const SeenFrame& frame : frames)
-      column.of_frame.push_back(sign * hat(value_of(frame), out.at, k));
+    for (const double each : x) column.of_frame.push_back(sign * hat(each, out.at, k));
+    take_out(degree, x, &column.of_frame);
     out.columns.push_back(std::move(column));
   }
   return out;
@@ -92,15 +106,15 @@ std::vector<DepartureColumns> all_departures(const std::vector<SeenFrame>& frame
           of(Departure::kPanAxis, {Parameter::kPanAxis0, Parameter::kPanAxis1}),
           of(Departure::kTiltAxis, {Parameter::kTiltAxis0, Parameter::kTiltAxis1}),
           of(Departure::kClockOffset, {Parameter::kClockOffset}),
-          curve(Departure::kPanGear, What::kPan, -1, kAngleKnots, frames, pan),
-          curve(Departure::kTiltGear, What::kTilt, -1, kAngleKnots, frames, tilt),
+          curve(Departure::kPanGear, What::kPan, -1, kAngleKnots, 1, frames, pan),
+          curve(Departure::kTiltGear, What::kTilt, -1, kAngleKnots, 1, frames, tilt),
           play(Departure::kPanPlay, What::kPan, frames,
                [](const SeenFrame& frame) { return frame.heading.pan; }),
           play(Departure::kTiltPlay, What::kTilt, frames,
                [](const SeenFrame& frame) { return frame.heading.tilt; }),
-          curve(Departure::kFocalDrift, What::kFocalLength, 1, kTimeKnots, frames, time),
-          curve(Departure::kPanDrift, What::kPan, -1, kTimeKnots, frames, time),
-          curve(Departure::kTiltDrift, What::kTilt, -1, kTimeKnots, frames, time)};
+          curve(Departure::kFocalDrift, What::kFocalLength, 1, kTimeKnots, 0, frames, time),
+          curve(Departure::kPanDrift, What::kPan, -1, kTimeKnots, 0, frames, time),
+          curve(Departure::kTiltDrift, What::kTilt, -1, kTimeKnots, 0, frames, time)};
 }
 
 // L with covariance = L L^T; a zero row stays zero.
@@ -153,38 +167,55 @@ class PairEquations {
 
   // `d` against the present unknowns.
   [[nodiscard]] DepartureTest test(std::size_t d) const {
-    const DepartureColumns& departure = departures_[d];
+    DepartureTest out = test(std::vector<std::size_t>{d});
+    out.departure = departures_[d].departure;
+    out.at = departures_[d].at;
+    out.claimed_sigma = claimed_sigma(d);
+    return out;
+  }
+  // All of them together, which must not be free.
+  [[nodiscard]] DepartureTest test(const std::vector<std::size_t>& departures) const {
     DepartureTest out;
-    out.departure = departure.departure;
-    out.at = departure.at;
-    const int n = departure.count();
+    const std::vector<int> at = columns_at(departures);
+    const auto n = static_cast<int>(at.size());
     if (n == 0) return out;
-    const int at = unknowns() + first_column_[d];
     Eigen::MatrixXd left(n, solution_.size());
-    left << sums_.block(at, 0, n, unknowns()), columns_of(free_, at, n);
-    const Eigen::VectorXd s = sums_.block(at, last(), n, 1) - left * solution_;
+    Eigen::MatrixXd own(n, n);
+    Eigen::VectorXd right(n);
+    for (int i = 0; i < n; ++i) {
+      const int row = at[static_cast<std::size_t>(i)];
+      left.row(i) << sums_.block(row, 0, 1, unknowns()), columns_of(free_, row, 1);
+      right[i] = sums_(row, last());
+    }
+    for (int i = 0; i < n; ++i) own.row(i) = columns_of(at, at[static_cast<std::size_t>(i)], 1);
+    const Eigen::VectorXd s = right - left * solution_;
     const Eigen::MatrixXd explained = information_.solve(left.transpose());
-    const Eigen::MatrixXd V = sums_.block(at, at, n, n) - left * explained;
-    judge(sums_.block(at, at, n, n).diagonal(), s, V, scatter_of(at, explained, V), &out);
+    const Eigen::MatrixXd V = own - left * explained;
+    judge(own.diagonal(), s, V, scatter_of(at, explained, V), &out);
     return out;
   }
 
   // From now on these departures have any size, and no others.
   void set_free(const std::vector<std::size_t>& departures) {
-    free_.clear();
-    for (const std::size_t d : departures) {
-      for (int i = 0; i < departures_[d].count(); ++i)
-        free_.push_back(unknowns() + first_column_[d] + i);
-    }
+    free_ = columns_at(departures);
     solve();
   }
 
+ private:
   [[nodiscard]] double claimed_sigma(std::size_t d) const {
     if (departures_[d].parameters.empty()) return 0;
     return parameter_root_.row(departures_[d].parameters.front()).norm();
   }
 
- private:
+  [[nodiscard]] std::vector<int> columns_at(const std::vector<std::size_t>& departures) const {
+    std::vector<int> out;
+    for (const std::size_t d : departures) {
+      for (int i = 0; i < departures_[d].count(); ++i)
+        out.push_back(unknowns() + first_column_[d] + i);
+    }
+    return out;
+  }
+
   [[nodiscard]] int unknowns() const {
     return kFrameErrors * static_cast<int>(frames_.size()) + shared();
   }
@@ -338,7 +369,7 @@ class PairEquations {
 
   // By how much the variance of s exceeds V, as the places of a pair have errors in common. Only
   // the part by the pictures' noise is judged: Z~^T W (r - X x) pair by pair, Z~ = Z - X explained.
-  [[nodiscard]] double scatter_of(int at, const Eigen::MatrixXd& explained,
+  [[nodiscard]] double scatter_of(const std::vector<int>& at, const Eigen::MatrixXd& explained,
                                   const Eigen::MatrixXd& V) const {
     const auto n = static_cast<int>(V.rows());
     const int x_count = 2 * kFrameErrors + shared();
@@ -356,7 +387,8 @@ class PairEquations {
         const int global = unknowns() + static_cast<int>(k);
         change.row(free_[k] - unknowns() + x_count) << -explained.row(global), -solution_[global];
       }
-      for (int i = 0; i < n; ++i) change(at - unknowns() + x_count + i, i) += 1;
+      for (int i = 0; i < n; ++i)
+        change(at[static_cast<std::size_t>(i)] - unknowns() + x_count, i) += 1;
       change(own.rows() - 1, n) = 1;
       const Eigen::MatrixXd product = own * change;
       for (int i = 0; i < n; ++i) {
@@ -367,7 +399,8 @@ class PairEquations {
     }
     double out = 1;
     for (int i = 0; i < n; ++i) {
-      if (V(i, i) > kNotSeen * sums_(at + i, at + i))
+      const int column = at[static_cast<std::size_t>(i)];
+      if (V(i, i) > kNotSeen * sums_(column, column))
         out = std::max(out, 1 + (squares[i] - expected[i]) / V(i, i));
     }
     return out;
@@ -423,6 +456,69 @@ std::vector<std::size_t> without(const std::vector<std::size_t>& all, std::size_
   return out;
 }
 
+// The chi-square that is exceeded with the chance of log_limit.
+double chi_square_limit(int freedom, double log_limit) {
+  double low = 0;
+  double high = 1000;
+  for (int step = 0; step < 60; ++step) {
+    const double middle = (low + high) / 2;
+    (internal::log_chance(middle, freedom) > log_limit ? low : high) = middle;
+  }
+  return high;
+}
+
+// As if places erred on their own: what a departure does to all places of a pair alike scatters,
+// too, and would count against the departure itself where departures are compared.
+double full_chi_square(const DepartureTest& test) { return test.chi_square * test.scatter; }
+
+// One after the other, each the least probable beside those before.
+std::vector<std::size_t> found_in_turn(double log_limit, PairEquations* equations) {
+  std::vector<std::size_t> found;
+  while (found.size() < kMostFound) {
+    std::optional<std::size_t> worst;
+    double least = 0;
+    for (std::size_t d = 0; d < equations->departures().size(); ++d) {
+      if (std::find(found.begin(), found.end(), d) != found.end()) continue;
+      const DepartureTest test = equations->test(d);
+      if (!(test.log_chance < log_limit)) continue;
+      const double log_chance = internal::log_chance(full_chi_square(test), test.freedom);
+      if (!(log_chance < least)) continue;
+      least = log_chance;
+      worst = d;
+    }
+    if (!worst) break;
+    found.push_back(*worst);
+    equations->set_free(found);
+  }
+  return found;
+}
+
+// Of those, the ones that explain most for their number: what was found first may have stood for
+// what came later. Each has to explain as much as would be improbable if it were not there.
+std::vector<std::size_t> best_of(const std::vector<std::size_t>& found, double log_limit,
+                                 PairEquations* equations) {
+  equations->set_free({});
+  std::vector<double> price;
+  for (const std::size_t d : found)
+    price.push_back(chi_square_limit(std::max(1, equations->test(d).freedom), log_limit));
+  std::vector<std::size_t> best = found;
+  double most = -std::numeric_limits<double>::infinity();
+  for (unsigned subset = 1; subset < 1U << found.size(); ++subset) {
+    std::vector<std::size_t> chosen;
+    double gain = 0;
+    for (std::size_t k = 0; k < found.size(); ++k) {
+      if ((subset >> k & 1U) == 0) continue;
+      chosen.push_back(found[k]);
+      gain -= price[k];
+    }
+    gain += full_chi_square(equations->test(chosen));
+    if (gain <= most) continue;
+    most = gain;
+    best = chosen;
+  }
+  return best;
+}
+
 }  // namespace
 
 ModelCheckResult check_model(const std::vector<SeenFrame>& frames,
@@ -436,46 +532,14 @@ ModelCheckResult check_model(const std::vector<SeenFrame>& frames,
   out.pairs = static_cast<int>(pairs.size());
   for (const PairRows& pair : pairs) out.places += static_cast<int>(pair.places.size());
   out.noise_ratio = equations.noise_ratio();
-  const auto test_of = [&equations](std::size_t d) {
-    DepartureTest test = equations.test(d);
-    test.claimed_sigma = equations.claimed_sigma(d);
-    return test;
-  };
-  std::vector<std::size_t> found;
-  for (int round = 0; round <= kMostFound; ++round) {
-    std::optional<DepartureTest> worst;
-    std::size_t worst_at = 0;
-    for (std::size_t d = 0; d < equations.departures().size(); ++d) {
-      if (std::find(found.begin(), found.end(), d) != found.end()) continue;
-      DepartureTest test = test_of(d);
-      if (!worst || test.log_chance < worst->log_chance) {
-        worst = test;
-        worst_at = d;
-      }
-      if (round == 0) out.tests.push_back(std::move(test));
-    }
-    if (round == kMostFound || !worst || !(worst->log_chance < log_limit)) break;
-    found.push_back(worst_at);
-    equations.set_free(found);
-  }
-  // What was found first may have stood for what came later: each is tested beside all others.
-  for (std::size_t k = 0; found.size() > 1 && k < found.size();) {
-    const std::vector<std::size_t> others = without(found, found[k]);
-    equations.set_free(others);
-    if (test_of(found[k]).log_chance < log_limit) {
-      ++k;
-    } else {
-      found = others;
-      k = 0;
-    }
-  }
+  for (std::size_t d = 0; d < equations.departures().size(); ++d)
+    out.tests.push_back(equations.test(d));
+  std::vector<std::size_t> found = found_in_turn(log_limit, &equations);
+  if (found.size() > 1) found = best_of(found, log_limit, &equations);
   for (const std::size_t d : found) {
     equations.set_free(without(found, d));
-    out.found.push_back(test_of(d));
+    out.found.push_back(equations.test(d));
   }
-  std::sort(out.found.begin(), out.found.end(), [](const DepartureTest& a, const DepartureTest& b) {
-    return a.log_chance < b.log_chance;
-  });
   return out;
 }
 

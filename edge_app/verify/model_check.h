@@ -5,7 +5,8 @@
 // A departure is columns Z of unknown size a. With C the covariance of r that is claimed
 //   s = Z^T C^-1 r,   V = Z^T C^-1 Z,   s^T V^-1 s ~ chi-square if there is none    (score test)
 // Noise of the pictures is measured: by the residuals, and by how the pairs' parts of s scatter.
-// Departures are taken one after the other, the least probable first, until nothing is improbable.
+// Departures are taken one after the other, the least probable first, until nothing is improbable;
+// of these, those stay that explain most for their number.
 // rad, s, px. Allocates.
 
 #include <array>
@@ -51,8 +52,8 @@ struct DepartureTest {
   double claimed_sigma = 0;  // of a parameter, by the calibration
 };
 
-// Tests of all departures; and of those that were found, each with the others left free, the least
-// probable first.
+// Tests of all departures; and of those that were found, in the order of what they explain, each
+// with the others left free.
 struct ModelCheckResult {
   std::vector<DepartureTest> tests;
   std::vector<DepartureTest> found;

@@ -59,7 +59,7 @@ struct Verification {
   double chance_limit = 0;  // of each comparison
   std::vector<ClaimComparison> claims;
   std::vector<ModelComparison> model;
-  std::vector<DepartureTest> found;  // the least probable first
+  std::vector<DepartureTest> found;  // in the order of what they explain
   // For plots.
   std::vector<PairRows> by_landmarks, by_telemetry, by_all_samples;
 };
