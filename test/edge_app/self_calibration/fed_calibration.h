@@ -160,7 +160,7 @@ inline std::vector<Published> feed(SelfCalibration* calibration, const Simulatio
     const double picture = taken(frame.frame);
     tracks.image_repeated = frame.frame > 0 && picture == taken(frame.frame - 1);
     if (tracks.image_repeated) tracks.tracker = FrameTracks::Tracker::kNone;
-    const auto shown = static_cast<std::int64_t>(std::ceil(picture / how.converted));
+    const auto shown = static_cast<std::int64_t>(picture / how.converted);
     for (const TrackedPoint& point : points[shown]) {
       if (tracks.count == kMaxFramePoints || (how.blurred && how.blurred(frame.stamp_s))) break;
       tracks.points[static_cast<std::size_t>(tracks.count++)] = point;
