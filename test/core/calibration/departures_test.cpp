@@ -191,7 +191,7 @@ TEST(Departures, DifferentDistancesAreNamed) {
   const double sigma = parameter_sigma(result.calibration, Parameter::kFocalLength);
   EXPECT_LT(std::abs(result.calibration.camera.focal_length - s.focal_length), 3 * sigma);
   // Inverse distances of 1 / 10 to 1 / 30 are 0.06 with a spread of 0.02.
-  EXPECT_LT(sigma, 3 * 2.5 * 0.02 * 0.05 * s.focal_length);
+  EXPECT_LT(sigma, 3 * 2 * 0.02 * 0.05 * s.focal_length);
 }
 
 // Neighbours at one distance: the trajectory follows them.
@@ -231,9 +231,10 @@ TEST(Departures, AreDescribedInWords) {
   quality.causes = {{"different distances", 270, 2, 1, "per mille of the focal length"}};
   const auto of_depth = quality.describe_departures();
   ASSERT_EQ(of_depth.size(), 3u);
-  EXPECT_EQ(of_depth[2],
-            "what is nearer than 50 m is seen where it is not, beyond the focal length's sigma, if "
-            "the lens's pupil lies 5 cm before or behind the axes");
+  EXPECT_EQ(
+      of_depth[2],
+      "the focal length's sigma covers things farther than 13 m, if the lens's pupil lies 5 cm "
+      "before or behind the axes");
 }
 
 }  // namespace
