@@ -228,12 +228,12 @@ TEST(Departures, AreDescribedInWords) {
             "sigmas have grown to that");
   EXPECT_EQ(lines[1], "likeliest cause: play, 0.025 mrad; the sigmas have what it does");
   EXPECT_EQ(lines[2], "beside it: optical centre, 11 px; the sigmas have what it does");
-  quality.causes = {{"different distances", 270, 2, 1, "per mille of the focal length"}};
+  quality.causes = {{"different distances", 270, 2, 1.25, "per mille of the focal length"}};
   const auto of_depth = quality.describe_departures();
   ASSERT_EQ(of_depth.size(), 3u);
   EXPECT_EQ(
       of_depth[2],
-      "the focal length's sigma covers things farther than 13 m, if the lens's pupil lies 5 cm "
+      "the focal length's sigma covers things farther than 10 m, if the lens's pupil lies 5 cm "
       "before or behind the axes");
 }
 
