@@ -8,6 +8,8 @@ namespace alidade {
 namespace {
 
 constexpr double kPupil_m = 0.05;  // usual, of lenses on heads
+// Spreads of the inverse distances, from 0: two sigmas, one to either side of the mean (departures.cpp).
+constexpr double kCovered = 4;
 constexpr const char* kDifferentDistances = "different distances";
 
 }  // namespace
@@ -118,10 +120,10 @@ std::vector<std::string> CalibrationQuality::describe_departures() const {
     lines.push_back((&c == &causes.front() ? "likeliest cause: " : "beside it: ") + c.cause + ", " +
                     number(c.size) + " " + c.unit + "; the sigmas have what it does");
     if (c.cause == kDifferentDistances && c.size > 0) {
-      lines.push_back("what is nearer than " + number(1e3 * kPupil_m / c.size) +
-                      " m is seen where it is not, beyond the focal length's sigma, if the lens's "
-                      "pupil lies " +
-                      number(100 * kPupil_m) + " cm before or behind the axes");
+      lines.push_back("the focal length's sigma covers things farther than " +
+                      number(1e3 * kPupil_m / (kCovered * c.size)) +
+                      " m, if the lens's pupil lies " + number(100 * kPupil_m) +
+                      " cm before or behind the axes");
     }
   }
   return lines;

@@ -23,7 +23,7 @@ constexpr double kLeastLeft = 1e-6;
 
 // Mean of the inverse distances over their spread: 1 to 5 in scenes whose farthest thing is 30 to 2
 // times as far as the nearest.
-constexpr double kCommonDepth = 2.5;
+constexpr double kCommonDepth = 2;
 
 constexpr int kGearKnots = 12;
 constexpr int kDriftKnots = 8;

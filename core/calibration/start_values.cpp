@@ -139,6 +139,7 @@ StageStatus start_values(const CalibrationInput& input, const CalibrationOptions
   if (options.focal_length && options.focal_length->sigma == 0) {
     state.camera.focal_length = mean.camera.focal_length;
   }
+  state.camera.set_centre_offset(mean.camera.centre_offset());
   state.corner_distortion = mean.corner_distortion;
   state.readout_s = mean.readout_s;
   state.mechanics = mean.mechanics;

@@ -290,6 +290,17 @@ TEST(Calibrate, FindsAFreeCentreWithinItsSigmas) {
   }
 }
 
+TEST(Calibrate, UsesACentreThatIsExactWhereverItIs) {
+  Simulation s = small_simulation(34);
+  s.radial_distortion = 0.3;
+  s.optical_centre_offset_px = {-40, 25};
+  CalibrationOptions options;
+  options.centre_offset_px = s.optical_centre_offset_px;
+  const CalibrationResult result = calibrate(simulate(s), options);
+  EXPECT_EQ(result.calibration.camera.centre_offset(), s.optical_centre_offset_px);
+  expect_within_sigmas(s, result);
+}
+
 // In the camera frame through the estimate: the axes are then turned by the centre's error.
 TEST(Calibrate, TellsAxesInTheFrameThroughItsCentre) {
   for (const double f : {4000.0, 30000.0}) {

@@ -191,7 +191,7 @@ TEST(Departures, DifferentDistancesAreNamed) {
   const double sigma = parameter_sigma(result.calibration, Parameter::kFocalLength);
   EXPECT_LT(std::abs(result.calibration.camera.focal_length - s.focal_length), 3 * sigma);
   // Inverse distances of 1 / 10 to 1 / 30 are 0.06 with a spread of 0.02.
-  EXPECT_LT(sigma, 3 * 2.5 * 0.02 * 0.05 * s.focal_length);
+  EXPECT_LT(sigma, 3 * 2 * 0.02 * 0.05 * s.focal_length);
 }
 
 // Neighbours at one distance: the trajectory follows them.
@@ -228,12 +228,13 @@ TEST(Departures, AreDescribedInWords) {
             "sigmas have grown to that");
   EXPECT_EQ(lines[1], "likeliest cause: play, 0.025 mrad; the sigmas have what it does");
   EXPECT_EQ(lines[2], "beside it: optical centre, 11 px; the sigmas have what it does");
-  quality.causes = {{"different distances", 270, 2, 1, "per mille of the focal length"}};
+  quality.causes = {{"different distances", 270, 2, 1.25, "per mille of the focal length"}};
   const auto of_depth = quality.describe_departures();
   ASSERT_EQ(of_depth.size(), 3u);
-  EXPECT_EQ(of_depth[2],
-            "what is nearer than 50 m is seen where it is not, beyond the focal length's sigma, if "
-            "the lens's pupil lies 5 cm before or behind the axes");
+  EXPECT_EQ(
+      of_depth[2],
+      "the focal length's sigma covers things farther than 10 m, if the lens's pupil lies 5 cm "
+      "before or behind the axes");
 }
 
 }  // namespace
