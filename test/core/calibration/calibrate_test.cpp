@@ -328,7 +328,8 @@ TEST(Calibrate, TellsAxesInTheFrameThroughItsCentre) {
     const Calibration middle = with_centre_error(exact.calibration, result.calibration);
     error = calibration_error(s, middle);
     for (const Parameter p : {Parameter::kFocalLength, Parameter::kRadialDistortion}) {
-      EXPECT_LT(std::abs(error[index(p)]), kMostSigmas * parameter_sigma(middle, p)) << to_string(p);
+      EXPECT_LT(std::abs(error[index(p)]), kMostSigmas * parameter_sigma(middle, p))
+          << to_string(p);
     }
   }
 }
