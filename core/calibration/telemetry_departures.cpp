@@ -105,6 +105,7 @@ bool TelemetryDepartures::estimate(const AdjustmentData& data, const AdjustmentS
     add_possible_curves(normal, sure);
   }
   add_possible_play(&sure);
+  add_possible_slopes(&sure);
   refine_departures(normal.S, normal.g, parts_, sure, &fit_.priors);
   fit_ = fit_departures(normal.S, normal.g, parts_, std::move(fit_.priors), sure);
   const VectorXd moved = subtracted_.size() == 0 ? fit_.mean : VectorXd(fit_.mean - subtracted_);
@@ -306,19 +307,29 @@ MatrixXd TelemetryDepartures::claim() const {
   return root;
 }
 
+void TelemetryDepartures::add_slope(int axis, double rise, MatrixXd* root) const {
+  const DeparturePart& curve = parts_[curve_part(axis)];
+  if (curve.count == 0 || curve.closed) return;
+  root->conservativeResize(parts_.back().first + 1, root->cols() + 1);
+  root->rightCols<1>().setZero();
+  root->col(root->cols() - 1).segment(curve.first, curve.count) =
+      VectorXd::LinSpaced(curve.count, -rise / 2, rise / 2);
+}
+
 MatrixXd TelemetryDepartures::with_slopes(const MatrixXd& sure) const {
   constexpr double kSteepest = 0.02;
   MatrixXd root = sure;
-  for (const int axis : {0, 1}) {
-    const DeparturePart& curve = parts_[curve_part(axis)];
-    if (curve.count == 0 || curve.closed) continue;
-    root.conservativeResize(Eigen::NoChange, root.cols() + 1);
-    root.rightCols<1>().setZero();
-    const double half = 0.5 * knots_[static_cast<std::size_t>(axis)].extent_rad();
-    root.col(root.cols() - 1).segment(curve.first, curve.count) =
-        VectorXd::LinSpaced(curve.count, -kSteepest * half, kSteepest * half);
-  }
+  for (const int axis : {0, 1})
+    add_slope(axis, kSteepest * knots_[static_cast<std::size_t>(axis)].extent_rad(), &root);
   return root;
+}
+
+void TelemetryDepartures::add_possible_slopes(MatrixXd* sure) const {
+  constexpr double kRise = 3;  // amplitudes; a sine of twice the range rises by as much
+  for (const int axis : {0, 1}) {
+    const std::size_t part = curve_part(axis);
+    if (is_present(part)) add_slope(axis, kRise * fit_.priors[part].amplitude, sure);
+  }
 }
 
 void TelemetryDepartures::add_possible_curves(const Normal& normal, const MatrixXd& sure) {

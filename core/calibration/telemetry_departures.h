@@ -84,6 +84,10 @@ class TelemetryDepartures {
   [[nodiscard]] bool eliminate(const AdjustmentData& data, const AdjustmentState& state,
                                const Linearisation& at, Adjustment* adjustment, Normal* out) const;
   [[nodiscard]] Eigen::MatrixXd claim() const;
+  // g of one axis as a straight line, rad over all knots, one standard deviation.
+  void add_slope(int axis, double rise, Eigen::MatrixXd* root) const;
+  // Where g is a curve of no period, its bend tells little of its slope.
+  void add_possible_slopes(Eigen::MatrixXd* sure) const;
   // Of either axis g may have any slope: no choice must rest on the other axis having none.
   [[nodiscard]] Eigen::MatrixXd with_slopes(const Eigen::MatrixXd& sure) const;
   // A head that errs by so much on one axis may well err as much on the other one, too slowly to

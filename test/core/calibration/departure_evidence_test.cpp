@@ -143,6 +143,77 @@ TEST(DepartureEvidence, PosteriorErrorsAreWhatItSays) {
   EXPECT_LT(squares, 185);
 }
 
+// Six readings of sigma 1 at each knot, of which a straight line is nobody's knowledge: another
+// unknown explains it, as a focal length does.
+struct UnknownSlope {
+  Eigen::MatrixXd S;
+  Eigen::VectorXd g;
+
+  UnknownSlope(const Eigen::VectorXd& curve, std::mt19937_64* random) {
+    const Eigen::VectorXd straight = line();
+    const Eigen::MatrixXd project =
+        Eigen::MatrixXd::Identity(kKnots, kKnots) - straight * straight.transpose();
+    S = Eigen::MatrixXd::Zero(kKnots + 2, kKnots + 2);
+    S.topLeftCorner<kKnots, kKnots>() = 6 * project;
+    g = Eigen::VectorXd::Zero(kKnots + 2);
+    g.head<kKnots>() = project * (6 * curve + std::sqrt(6.0) * normal_draws(kKnots, random));
+  }
+  // Of length 1.
+  static Eigen::VectorXd line() { return Eigen::VectorXd::LinSpaced(kKnots, -1, 1).normalized(); }
+};
+
+Eigen::VectorXd sine(double amplitude, double period, double phase) {
+  Eigen::VectorXd out(kKnots);
+  for (Eigen::Index i = 0; i < kKnots; ++i)
+    out[i] = amplitude * std::sin(2 * kPi * static_cast<double>(i) / period + phase);
+  return out;
+}
+
+// The mean of 80 squares of normal deviates is below 1.64 with a chance of 0.9999.
+TEST(DepartureEvidence, ASineOfOnePeriodTellsItsSlopeWithTheErrorOfThePeriod) {
+  constexpr int kRuns = 80;
+  std::mt19937_64 random(6);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  double squares = 0;
+  for (int run = 0; run < kRuns; ++run) {
+    const double period = kKnots * (0.6 + 0.4 * uniform(random));
+    const Eigen::VectorXd truth = sine(20, period, 2 * kPi * uniform(random));
+    const UnknownSlope data(truth, &random);
+    const auto parts = all_parts();
+    auto priors = choose_departures(data.S, data.g, parts, kNothingSure);
+    refine_departures(data.S, data.g, parts, kNothingSure, &priors);
+    EXPECT_GT(priors[1].amplitude, 0) << run;
+    const DepartureFit fit = fit_departures(data.S, data.g, parts, priors, kNothingSure);
+    const Eigen::VectorXd line = UnknownSlope::line();
+    const double error = line.dot(fit.mean.head<kKnots>() - truth);
+    squares += error * error / line.dot(fit.covariance.topLeftCorner<kKnots, kKnots>() * line);
+  }
+  EXPECT_LT(squares / kRuns, 1.64);
+  EXPECT_GT(squares / kRuns, 0.3);
+}
+
+TEST(DepartureEvidence, PartOfASineIsACurve) {
+  std::mt19937_64 random(7);
+  for (const double periods : {0.3, 0.5}) {
+    const UnknownSlope data(sine(30, kKnots / periods, 0.7), &random);
+    const auto parts = all_parts();
+    auto priors = choose_departures(data.S, data.g, parts, kNothingSure);
+    refine_departures(data.S, data.g, parts, kNothingSure, &priors);
+    EXPECT_GT(priors[0].amplitude, 0) << periods;
+    EXPECT_EQ(priors[1].amplitude, 0) << periods;
+  }
+}
+
+TEST(DepartureEvidence, APossibleCurveOfWhichNothingIsSeenIsAsLongAsItMayBe) {
+  std::mt19937_64 random(8);
+  const UnknownSlope data(Eigen::VectorXd::Zero(kKnots), &random);
+  const auto parts = all_parts();
+  const std::vector<DeparturePrior> nothing(parts.size());
+  const DeparturePrior prior = possible_curve(data.S, data.g, parts, nothing, kNothingSure, 0, 15);
+  EXPECT_EQ(prior.amplitude, 15);
+  EXPECT_NEAR(prior.length, 2 * (kKnots - 1), 1e-9);
+}
+
 TEST(DepartureEvidence, TakesOneOfTwoRivalsAndNoNegativeNumber) {
   std::mt19937_64 random(4);
   const auto parts = all_parts();
