@@ -24,11 +24,17 @@ constexpr double kLeastRate_px_s = 0.1;
 constexpr double kLeastRateOfAll_px_s = 0.2;
 // Of the camera's rate. By so much landmarks drift as they are near and the pupil is off the axes.
 constexpr double kParallax = 0.002;
+// From there on a group that moves had its part in the map: share of looks in which it agreed with
+// the map, and of the landmarks.
+constexpr double kBendingMatched = 0.5;
+constexpr double kBendingShare = 0.25;
 constexpr double kDecided = 12;  // difference of chi-squares
 constexpr double kProven = 9;
 constexpr double kMoves = 30;        // chi-square of one group
 constexpr double kLeastTrial_s = 1;  // from when on one group can be said to move
 constexpr double kLongTrial_s = 5;
+constexpr double kShownBy = 20;  // degrees of freedom that show a misfit
+constexpr double kLeastMisfit = 0.25;
 constexpr double kSteady = 2;     // misfit
 constexpr double kSlope = 0.002;  // of telemetry against angle, unless it is told
 constexpr double kUnmodelledRate_px_s = 0.03;
@@ -182,7 +188,7 @@ bool SceneDrift::find_groups(double pixel) {
     life_s += noted.life_s;
     matched += noted.matched;
   }
-  bent_ = matched > 0.5 * alike && alike > 0.25 * tested;
+  bent_ = matched > kBendingMatched * alike && alike > kBendingShare * tested;
   return alike >= least && alike >= kCoherent * apart &&
          rate > std::max(kLeastRate_px_s * pixel, kParallax * std::sqrt(mean_square_rate_)) &&
          rate * life_s > kLeastShift_px * pixel * alike;
@@ -209,11 +215,14 @@ bool SceneDrift::map_rate(const Vector2<double>& slope_sigma, double pixel, Rate
     if (!all_finite(x) || !(inverse(1, 1) > 0)) return false;
     // The camera turns by as much less.
     out->value[i] = -x[1];
-    out->variance[i] = inverse(1, 1) + floor * floor;
+    out->variance[i] = inverse(1, 1);
     out->misfit += std::max(0.0, line.square - x.dot(line.gradient));
     freedom += std::max(1.0, line.weight - 3);
   }
   out->misfit /= freedom;
+  // Variances allow for errors that frames share, and may say too much.
+  if (freedom > kShownBy) out->variance *= std::clamp(out->misfit, kLeastMisfit, 1.0);
+  out->variance.array() += floor * floor;
   return true;
 }
 
@@ -243,7 +252,9 @@ SceneVerdict SceneDrift::judge_one(double pixel) {
   doubt_.setZero();
   Rate map;
   if (!map_rate(slope_sigma_.cwiseMax(kSlope), pixel, &map)) return SceneVerdict::kRest;
-  rate_ = group_ + map.value;
+  // Landmarks that the map does not follow do not say where it goes.
+  const bool follows = group_.norm() < 0.5 * map.value.norm();
+  rate_ = map.value;
   const double chi = chi_square(rate_, map.variance);
   const double since_s = noted_s_ - begun_s_;
   const bool steady = map.misfit < kSteady;
@@ -252,7 +263,7 @@ SceneVerdict SceneDrift::judge_one(double pixel) {
     const bool is_other = chi_square(rate_ - moved_rate_, map.variance) - chi > kProven;
     if (rests && (is_other || since_s > kLongTrial_s)) on_trial_ = false;
   }
-  if (chi > kMoves && steady && since_s >= kLeastTrial_s &&
+  if (chi > kMoves && steady && follows && since_s >= kLeastTrial_s &&
       rate_.norm() > kLeastRateOfAll_px_s * pixel) {
     on_trial_ = true;
     moved_rate_ = rate_;

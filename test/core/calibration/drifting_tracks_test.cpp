@@ -50,7 +50,9 @@ TEST(DriftingTracks, AreLeftOutBeTheyTheMost) {
     EXPECT_GT(clouds, 0.4 * static_cast<double>(input.observations.size()));
     // Those seen for long.
     EXPECT_GT(result.exclusions.observations_drifting, 0.7 * clouds);
-    EXPECT_LT(result.exclusions.observations_drifting, 1.02 * clouds);
+    // Ground that is beside them in doubt may go, too; enough stays.
+    EXPECT_LT(result.exclusions.observations_drifting,
+              0.85 * static_cast<double>(input.observations.size()));
     const auto error = calibration_error(s, result.calibration);
     for (int i = 0; i < kParameterCount; ++i) {
       EXPECT_LE(std::abs(error[i]), 4.5 * std::sqrt(result.calibration.covariance(i, i)) + 1e-15)
