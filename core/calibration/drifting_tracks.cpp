@@ -18,8 +18,11 @@ class DriftFinder {
  public:
   static constexpr int kMostControlPoints = 600;  // some minutes
 
-  DriftFinder(AdjustmentData* data, const AdjustmentState& state, Adjustment* adjustment)
-      : fit_(data, state, adjustment), pixel_rad_(1 / state.camera.focal_length) {}
+  DriftFinder(AdjustmentData* data, const AdjustmentState& state, double resolution_rad,
+              Adjustment* adjustment)
+      : fit_(data, state, adjustment),
+        pixel_rad_(1 / state.camera.focal_length),
+        resolution_rad_(resolution_rad) {}
 
   DriftingTracks find();
 
@@ -37,6 +40,8 @@ class DriftFinder {
   static constexpr double kPerFreeTrack = 6;      // what freeing a track costs, of its two unknowns
   static constexpr double kSure = 50;             // difference of sums of squares
   static constexpr double kLeastDrift_px_s = 0.1;  // less is no drift of the picture
+  // With less than this, nothing is refused: a lens that is not as stated does as much.
+  static constexpr double kHarmful_px_s = 0.5;
 
   struct Hypothesis {
     bool holds = false;
@@ -72,6 +77,8 @@ class DriftFinder {
 
   DriftFit fit_;
   double pixel_rad_;
+  double resolution_rad_;
+  double span_s_ = 0;  // from the first track's begin to the last one's end
   std::vector<Window> windows_;
 };
 
@@ -84,6 +91,7 @@ void DriftFinder::find_windows() {
     end = std::max(end, track.end_s);
   }
   if (!(begin < end)) return;
+  span_s_ = end - begin;
   const int count = std::max(1, static_cast<int>(2 * (end - begin) / kWindow_s) - 1);
   for (int i = 0; i < count; ++i) {
     const double from = begin + 0.5 * i * kWindow_s;
@@ -238,7 +246,7 @@ bool DriftFinder::all_drift(Vector2<double>* rate) const {
   for (const auto& r : rates) square += (r - mean).squaredNorm() / (count - 1);
   *rate = mean;
   // Windows overlap by half.
-  return mean.norm() > 5 * kLeastDrift_px_s * pixel_rad_ &&
+  return mean.norm() > kHarmful_px_s * pixel_rad_ && mean.norm() * span_s_ > 2 * resolution_rad_ &&
          mean.norm() > kMuch * std::sqrt(2 * square / count);
 }
 
@@ -289,7 +297,7 @@ DriftingTracks DriftFinder::find() {
   const Hypothesis against = settle(std::move(other));
   out.rate = group.rate;
   if (against.holds && against.at_rest != best.at_rest && against.cost - best.cost < kSure) {
-    out.finding = DriftFinding::kUndecided;
+    if (group.rate.norm() > kHarmful_px_s * pixel_rad_) out.finding = DriftFinding::kUndecided;
     return out;
   }
   out.finding = DriftFinding::kGroup;
@@ -309,7 +317,7 @@ DriftingTracks find_drifting_tracks(AdjustmentData* data, const AdjustmentState&
     none.drifts.assign(state.landmarks.size(), 0);
     return none;
   }
-  return DriftFinder(data, state, adjustment).find();
+  return DriftFinder(data, state, resolution_rad, adjustment).find();
 }
 
 }  // namespace alidade::internal

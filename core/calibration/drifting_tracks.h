@@ -28,10 +28,11 @@ struct DriftingTracks {
   Vector2<double> rate = Vector2<double>::Zero();  // of the group, (pan, tilt)
 };
 
-// state: near the minimum. Takes some solutions of the adjustment's size; longer recordings than
-// some minutes are not looked at. The data's marks stay.
+// state: near the minimum. resolution_rad: telemetry's steps, within which all may seem to drift;
+// 0: none. Takes some solutions of the adjustment's size; longer recordings than some minutes are
+// not looked at. The data's marks stay.
 [[nodiscard]] DriftingTracks find_drifting_tracks(AdjustmentData* data,
                                                   const AdjustmentState& state,
-                                                  Adjustment* adjustment);
+                                                  double resolution_rad, Adjustment* adjustment);
 
 }  // namespace alidade::internal

@@ -165,7 +165,7 @@ bool StagedAdjustment::settle_robustly() {
 // True if something was left out; the adjustment then begins anew.
 bool StagedAdjustment::leave_out_drifting() {
   const DriftingTracks found =
-      find_drifting_tracks(&selected_->data, adjusted_.state, &adjustment_);
+      find_drifting_tracks(&selected_->data, adjusted_.state, noise_.resolution_rad, &adjustment_);
   drift_ = found.finding;
   drift_px_s_ = found.rate.norm() * adjusted_.state.camera.focal_length;
   if (drift_ != DriftFinding::kGroup) return false;

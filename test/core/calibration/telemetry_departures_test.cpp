@@ -98,7 +98,7 @@ TEST(TelemetryDepartures, TellAGearOfAPeriodNearTheRangeFromAFocalLength) {
   for (int run = 0; run < kRuns; ++run) {
     const Simulation s = narrow_with_gear(static_cast<std::uint64_t>(40 + run), 2e-4);
     const CalibrationResult result = calibrate(simulate(s));
-    expect_calibrated_within_sigmas(s, result);
+    expect_within_sigmas(s, result);
     const int f = index(Parameter::kFocalLength);
     squares += std::pow(calibration_error(s, result.calibration)[f], 2) /
                result.calibration.covariance(f, f);
@@ -111,7 +111,7 @@ TEST(TelemetryDepartures, LearnAGearThatKeepsTheFirstAdjustmentFromSettling) {
   Simulation s = narrow_with_gear(61, 1.5e-3);
   s.focal_length = 6000;
   const CalibrationResult result = calibrate(simulate(s));
-  expect_calibrated_within_sigmas(s, result);
+  expect_within_sigmas(s, result);
   EXPECT_TRUE(result.telemetry_error.exists());
 }
 

@@ -17,6 +17,7 @@ namespace alidade {
 namespace {
 
 using ::testing::AllOf;
+using ::testing::ContainsRegex;
 using ::testing::HasSubstr;
 
 namespace fs = std::filesystem;
@@ -68,7 +69,9 @@ TEST_F(VerifyTest, AWrongFocalLengthIsContradictedAndNamed) {
   const Result result = verify(recording(), changed("value: 8002", "value: 8042"));
   ASSERT_EQ(result.exit_code, 1) << result.output << result.errors;
   EXPECT_THAT(result.output, HasSubstr("contradicted: "));
-  EXPECT_THAT(result.output, HasSubstr("likeliest cause: focal length (off by -4"));
+  // By 40 px, 4.5 of the sigmas that are told.
+  EXPECT_THAT(result.output,
+              ContainsRegex("likeliest cause: focal length \\(off by -(3[2-9]|4[0-8])"));
   EXPECT_TRUE(fs::exists(directory_.path() + "/out/verification.html"));
 }
 
