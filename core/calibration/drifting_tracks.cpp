@@ -311,7 +311,7 @@ DriftingTracks DriftFinder::find() {
 }  // namespace
 
 DriftingTracks find_drifting_tracks(AdjustmentData* data, const AdjustmentState& state,
-                                    Adjustment* adjustment) {
+                                    double resolution_rad, Adjustment* adjustment) {
   if (state.trajectory.control_points() > DriftFinder::kMostControlPoints) {
     DriftingTracks none;
     none.drifts.assign(state.landmarks.size(), 0);
