@@ -243,9 +243,10 @@ RealityFilm reality_film(const RealityRow& row, std::uint64_t seed, const fs::pa
   double axes[4];
   for (double& axis : axes) axis = d.normal(3);
   const double offset_ms = d.between(-150, 50);
-  const double amplitude = d.between(0.8, 1.05) * d.sign();
+  const double amplitude = d.between(0.8, 1.05);
+  const double side = d.sign();
   const double period = d.between(11.5, 14);
-  const double azimuth = d.between(-0.3, 0.3) * field_deg;
+  const double azimuth = side * d.between(-0.3, 0.3) * field_deg;
   const double elevation = d.between(-0.3, 0.3) * field_deg;
 
   std::string text;
