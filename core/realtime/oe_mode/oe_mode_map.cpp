@@ -109,7 +109,8 @@ bool OeMode::judge_scene() {
   constexpr double kCells = 0.6;  // of a landmark's, around it
   if (!frame_.solved) return false;
   frame_.solved = false;
-  if (own_lens() != nullptr) {
+  // A lens that is still being told makes landmarks drift as the camera turns.
+  if (own_lens() != nullptr || lens_is_learnt()) {
     drift_.begin_map();
     return false;
   }

@@ -269,7 +269,7 @@ SceneVerdict SceneDrift::judge_one(double pixel) {
     moved_rate_ = rate_;
     return SceneVerdict::kAllMove;
   }
-  if (steady && chi > 4) {
+  if (steady && since_s >= kLeastTrial_s && chi > kAlike) {
     // Half of the way that the map would have gone, by how likely it has.
     const Vector2<double> way = 0.5 * std::min(since_s, kMemory_s) * rate_;
     doubt_ = way * way.transpose() / (1 + std::exp(0.5 * (9 - chi)));
