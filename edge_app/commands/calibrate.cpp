@@ -68,6 +68,8 @@ void set_priors(const CalibrateOptions& options, CalibrationOptions* calibration
     calibration->pan_scale.sigma = *options.scale_sigma;
     calibration->tilt_scale.sigma = *options.scale_sigma;
   }
+  if (options.angle_accuracy_deg)
+    calibration->angle_accuracy_rad = *options.angle_accuracy_deg * kPi / 180;
   std::string error;
   if (!calibration->validate(&error)) throw CommandError(kExitUsage, error);
 }

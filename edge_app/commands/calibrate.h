@@ -23,6 +23,7 @@ struct CalibrateOptions {
   std::string line_delay;
   std::string clock_offset;
   std::optional<double> scale_sigma;
+  std::optional<double> angle_accuracy_deg;
 };
 
 // Calibrates from one recording, or from all of them together if they differ in zoom. Returns the

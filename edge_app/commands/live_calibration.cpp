@@ -109,6 +109,7 @@ Calibrating begin_calibrating(const Config& config, const std::string& path,
     options.noise.pan_tilt_sigma_rad = std::hypot(
         *config.pan_tilt.angle_sigma_rad, config.pan_tilt.angle_quantum_rad / std::sqrt(12.0));
   }
+  options.adjustment.angle_accuracy_rad = config.pan_tilt.angle_accuracy_deg * kPi / 180;
   options.zoom_tolerance = config.calibration.zoom_tolerance;
   options.zooms = config.camera.focal_length_range.has_value();
   options.automatic = config.calibration.automatic;
