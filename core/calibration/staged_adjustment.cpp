@@ -143,6 +143,14 @@ StageStatus StagedAdjustment::adjust_on_inliers(CalibrationQuality* quality) {
   if (departs_) {
     adjusted_.covariance += departures_.covariance();
     adjusted_.telemetry_error = departures_.error();
+    const char* problem = nullptr;
+    if (!adjusted_.telemetry_error.pan.validate(&problem) ||
+        !adjusted_.telemetry_error.tilt.validate(&problem)) {
+      return {CalibrationStatus::kTelemetryMismatch,
+              "telemetry and images differ from place to place by more than a gear can (" +
+                  std::string(problem) +
+                  "): does the camera sway, or does the telemetry come at uneven delays?"};
+    }
   }
   release_centre();
   return {};

@@ -427,6 +427,13 @@ TelemetryError TelemetryDepartures::error() const {
         curve.values[n] = fit_.mean[part.first + k];
         curve.sigmas[n] = sigma[part.first + k];
       }
+      // Beyond its ends a curve fades no more steeply than its inverse allows (validate()).
+      constexpr double kLengthsOfEnds = 5;
+      const double ends =
+          std::max(std::abs(curve.values[0]),
+                   std::abs(curve.values[static_cast<std::size_t>(part.count - 1)]));
+      if (curve.length_rad > 0)
+        curve.length_rad = std::max(curve.length_rad, kLengthsOfEnds * ends);
     }
     Play& play = axis == 0 ? out.pan_play : out.tilt_play;
     for (int kind = 0; kind < kKinds; ++kind) {

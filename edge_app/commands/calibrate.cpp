@@ -72,6 +72,8 @@ void set_priors(const CalibrateOptions& options, int width, CalibrationOptions* 
     calibration->tilt_scale.sigma = *options.scale_sigma;
   }
   calibration->centre_sigma_px = options.centre_sigma_px.value_or(kUsualCentreShare * width);
+  if (options.angle_accuracy_deg)
+    calibration->angle_accuracy_rad = *options.angle_accuracy_deg * kPi / 180;
   std::string error;
   if (!calibration->validate(&error)) throw CommandError(kExitUsage, error);
 }

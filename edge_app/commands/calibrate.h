@@ -23,7 +23,8 @@ struct CalibrateOptions {
   std::string line_delay;
   std::string clock_offset;
   std::optional<double> scale_sigma;
-  std::optional<double> centre_sigma_px;  // empty: usual_centre_sigma_px()
+  std::optional<double> centre_sigma_px;  // empty: kUsualCentreShare of the width
+  std::optional<double> angle_accuracy_deg;
 };
 
 // Calibrates from one recording, or from all of them together if they differ in zoom. Returns the

@@ -171,6 +171,7 @@ std::vector<CalibrationJob> load_calibration_jobs(const std::string& directory,
     job.options.pan_scale.sigma = *noise.pan_tilt_scale_sigma;
     job.options.tilt_scale.sigma = *noise.pan_tilt_scale_sigma;
   }
+  job.options.angle_accuracy_rad = noise.pan_tilt_accuracy_rad.value_or(0);
   require(load_values((fs::path(directory) / "guess.yaml").string(), &job.guess, &error), error);
 
   Tables tables;

@@ -44,6 +44,13 @@ std::string is_film_duration(const std::string& text) {
              : fmt::format("'{}' is not a number of seconds above 0, up to {:.0f}", text,
                            kLongestFilm_s);
 }
+std::string is_accuracy(const std::string& text) {
+  const std::optional<double> value = number_of(text);
+  return value && *value >= 0 && *value <= 5
+             ? ""
+             : fmt::format("'{}' is not a number of degrees from 0 to 5", text);
+}
+
 std::string is_share(const std::string& text) {
   const std::optional<double> value = number_of(text);
   return value && *value >= 0 && *value <= 1
@@ -194,6 +201,13 @@ void add_calibrate(CLI::App& app, int* exit_code) {
                    "px; how far the optical centre may be from the picture's middle, one sigma; 0: "
                    "it is the middle (default: 1 % of the width)")
       ->check(is_length_px)
+      ->group(group);
+  command
+      ->add_option("--angle-accuracy", options->angle_accuracy_deg,
+                   "The maker's claim of telemetry's angles, deg (default: noise.yaml's "
+                   "pan_tilt_accuracy_rad, or none): the focal length is known to no better than "
+                   "this over the range of pan")
+      ->check(is_accuracy)
       ->group(group);
   command->callback([options, exit_code] { *exit_code = calibrate_recordings(*options); });
 }

@@ -112,6 +112,7 @@ Calibrating begin_calibrating(const Config& config, const std::string& path,
   }
   options.adjustment.centre_sigma_px =
       config.camera.centre_sigma_px.value_or(kUsualCentreShare * camera.width);
+  options.adjustment.angle_accuracy_rad = config.pan_tilt.angle_accuracy_deg * kPi / 180;
   options.zoom_tolerance = config.calibration.zoom_tolerance;
   options.zooms = config.camera.focal_length_range.has_value();
   options.automatic = config.calibration.automatic;

@@ -11,7 +11,8 @@
 namespace alidade {
 
 struct RecordingNoise : CalibrationNoise {
-  std::optional<double> pan_tilt_scale_sigma;  // prior of both scales
+  std::optional<double> pan_tilt_scale_sigma;   // prior of both scales
+  std::optional<double> pan_tilt_accuracy_rad;  // the maker's claim, see CalibrationOptions
 };
 
 // Pure. False with one line in *error. `name` names the file in errors.

@@ -160,6 +160,8 @@ PanTiltConfig read_pan_tilt(YamlSection section, const std::string& path) {
     section.fail("angle_sigma_rad",
                  "no head measures without error; give a sigma or angle_quantum_rad above 0");
   }
+  pan_tilt.angle_accuracy_deg =
+      section.number("angle_accuracy_deg", {0, 5, "deg"}).value_or(pan_tilt.angle_accuracy_deg);
   pan_tilt.acceleration_sigma_rad_s2 =
       section.number("acceleration_sigma_rad_s2", {0, 1000, "rad/s^2"})
           .value_or(pan_tilt.acceleration_sigma_rad_s2);

@@ -65,6 +65,12 @@ void parameters(ReportPage& page) {
       "</tbody>\n</table></div>\n<p class=\"soft\">sigma: one standard deviation, noise of image, "
       "telemetry and stamps included. Axes: in the base (forward, right, down), sigma of the two "
       "components in the tangent plane.</p>\n");
+  const std::string granted = taken_for_granted(page.result(), page.report().options);
+  if (granted.empty()) return;
+  page.add(
+      "<p class=\"soft\">The focal length's sigma takes for granted {}; the maker's claim: "
+      "--angle-accuracy, pan_tilt.angle_accuracy_deg.</p>\n",
+      granted);
 }
 
 void correlations(ReportPage& page) {

@@ -81,6 +81,26 @@ std::vector<SummaryRow> summary_rows(const CalibrationResult& result,
   return rows;
 }
 
+std::string taken_for_granted(const CalibrationResult& result, const CalibrationOptions& options) {
+  constexpr double kStep_s = 0.05;
+  constexpr double kDegree = kPi / 180;
+  const TrajectorySpline& trajectory = result.trajectory;
+  const double sigma = relative_focal_length_sigma(result.calibration);
+  if (options.angle_accuracy_rad > 0 || !(sigma > 0) || trajectory.segments() < 1) return {};
+  double least = trajectory.position(trajectory.begin_s()).pan;
+  double largest = least;
+  const double span_s = trajectory.end_s() - trajectory.begin_s();
+  const int steps = static_cast<int>(span_s / kStep_s);
+  for (int i = 1; i <= steps; ++i) {
+    const double pan = trajectory.position(trajectory.begin_s() + i * kStep_s).pan;
+    least = std::min(least, pan);
+    largest = std::max(largest, pan);
+  }
+  const double range = largest - least;
+  return fmt::format("a head exact to {:.2g} degrees over {:.2g} degrees", sigma * range / kDegree,
+                     range / kDegree);
+}
+
 std::string summary_text(const CalibrationResult& result, const CalibrationOptions& options) {
   std::vector<SummaryRow> rows = {{"parameter", "value", "sigma", "unit", "prior"}};
   const std::vector<SummaryRow> parameters = summary_rows(result, options);
@@ -117,6 +137,8 @@ std::string summary_text(const CalibrationResult& result, const CalibrationOptio
   for (const std::string& line : quality.describe_departures()) {
     text += "contradicts the model: " + line + "\n";
   }
+  if (const std::string granted = taken_for_granted(result, options); !granted.empty())
+    text += "focal length's sigma takes for granted: " + granted + "\n";
   for (const std::string& line : quality.advice) text += "advice: " + line + "\n";
   return text;
 }
@@ -191,6 +213,8 @@ std::string summary_json(const CalibrationResult& result, const CalibrationOptio
                                          {"size", cause.size},
                                          {"unit", cause.unit}});
   }
+  if (const std::string granted = taken_for_granted(result, options); !granted.empty())
+    json["taken_for_granted"] = granted;
   json["excluded"] = result.exclusions.describe();
   json["files"] = ordered_json::object();
   for (const auto& [kind, path] : files) json["files"][kind] = path;

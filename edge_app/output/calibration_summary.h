@@ -23,6 +23,10 @@ struct SummaryRow {
 std::vector<SummaryRow> summary_rows(const CalibrationResult& result,
                                      const CalibrationOptions& options);
 
+// What f's sigma takes for granted of the head, as no recording shows an error that turns as slowly
+// as the range that was visited; empty with a claim of the maker, or without such a sigma.
+std::string taken_for_granted(const CalibrationResult& result, const CalibrationOptions& options);
+
 // The table in aligned columns, the verdict, what was left out, and advice. Each line ends with a
 // line feed.
 std::string summary_text(const CalibrationResult& result, const CalibrationOptions& options);

@@ -29,6 +29,7 @@ void require_sound(const Config& config) {
   }
   FUZZ_REQUIRE(is_within(pan_tilt.angle_sigma_rad.value_or(0), 0, 0.1));
   FUZZ_REQUIRE(is_within(pan_tilt.angle_quantum_rad, 0, 0.1));
+  FUZZ_REQUIRE(is_within(pan_tilt.angle_accuracy_deg, 0, 5));
   FUZZ_REQUIRE(is_within(pan_tilt.max_repeat_s, 0, 10));
   if (pan_tilt.type == PanTiltConfig::Type::kHead) require_sound_head(pan_tilt.head);
   FUZZ_REQUIRE(is_within(config.camera.focal_length_px.value_or(1), 1, 1e8));

@@ -243,6 +243,9 @@ class StatusPage(SystemTest):
         self.assertAlmostEqual(crossed["u"], SETTINGS["image"]["width"] / 2 - step)
         self.assertAlmostEqual(crossed["v"], SETTINGS["image"]["height"] / 2 - step)
 
+        # While the clock filter warms up and the links' delay is open, sigma is as large as the head is fast.
+        wait_until(lambda: self.browser.execute_script("return record.mode === 'OE' && Math.max(...record.orientation_sigma_rad) < 1e-4"),
+                   "a sure orientation")
         self.fits_the_ground(picture)
         self.shows_targets(address)
 
@@ -264,17 +267,22 @@ class StatusPage(SystemTest):
             # By key: on a busy machine a live page can move between the choice of a place to click at and the click.
             self.browser.find_element(By.ID, name).send_keys(Keys.ENTER)
 
+        added = []
+
         def add(u, v, name, off=0):
-            # Where the direction meets the ground, as the test has it: the camera looks along the horizon.
+            # Where the direction meets the ground, as the test has it: the camera looks along the horizon. Apart from the others,
+            # as points of one view may leave the plane open.
             told = []
+            apart = 0.04  # rad
 
             def chosen():
                 self.browser.execute_script("forgetDirection(''); arguments[0].scrollIntoView({block: 'center'})", picture)
                 ActionChains(self.browser).move_to_element_with_offset(picture, u, v).click().perform()
                 wait_until(lambda: self.text("pointing-hint") != "", "an answer")
                 told[:] = [self.browser.execute_script("return marker?.direction")]
-                return told[0] is not None
+                return told[0] is not None and all(math.dist(told[0], other) > apart for other in added)
             wait_until(chosen, "a direction")
+            added.append(told[0])
             forward, right, down = told[0]
             # Tilted by 20 degrees: the picture looks near the horizon, and ground is what a base that leans sees.
             lean = 0.35

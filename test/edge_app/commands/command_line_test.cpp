@@ -211,6 +211,8 @@ TEST(CommandLine, NamesWhatWasMistypedAndWhatIsNearest) {
            Slip{{"map", "build", "x", "-o", "y", "--keyfames", "3"},
                 "unknown option '--keyfames'; did you mean --keyframes?; see alidade map build "
                 "--help"},
+           Slip{{"calibrate", "x", "--angle-accuracy", "6"},
+                "'6' is not a number of degrees from 0 to 5; see"},
            Slip{{"calibrate", "x", "--scale-sigma", "2"}, "'2' is not a number from 0 to 1; see"},
        }) {
     const Result result = alidade(arguments);

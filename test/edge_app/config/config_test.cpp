@@ -257,7 +257,7 @@ TEST_F(ConfigTest, EveryKeyIsRead) {
           "        width: 1280, height: 720}\n"
           "pan_tilt: {type: vapix, url: 'https://camera', user: eve, camera: 2, rate_hz: 12.5,\n"
           "           password_env: ALIDADE_TEST_PASSWORD, timeout_s: 0.5, max_backoff_s: 9,\n"
-          "           angle_sigma_rad: 2e-5, angle_quantum_rad: 1e-4}\n"
+          "           angle_sigma_rad: 2e-5, angle_quantum_rad: 1e-4, angle_accuracy_deg: 0.05}\n"
           "camera: {focal_length_px: 30000, aspect: 1.01, radial_distortion: -2.5,\n"
           "         centre_sigma_px: 2, line_delay_s: 1.5e-5, upside_down: true, zoom: fixed}\n"
           "calibration: {file: /etc/c.yaml, prior: bench/lens.yaml, auto: false, zoom_tolerance: "
@@ -292,6 +292,7 @@ TEST_F(ConfigTest, EveryKeyIsRead) {
   EXPECT_EQ(config_.pan_tilt.max_backoff_s, 9);
   EXPECT_EQ(config_.pan_tilt.angle_sigma_rad, 2e-5);
   EXPECT_EQ(config_.pan_tilt.angle_quantum_rad, 1e-4);
+  EXPECT_EQ(config_.pan_tilt.angle_accuracy_deg, 0.05);
   EXPECT_EQ(config_.camera.focal_length_px, 30000);
   EXPECT_EQ(config_.camera.aspect, 1.01);
   EXPECT_EQ(config_.camera.radial_distortion, -2.5);
@@ -678,6 +679,7 @@ TEST_F(ConfigTest, TheExampleIsReadAndShowsTheDefaults) {
   EXPECT_EQ(example.pan_tilt.timeout_s, config_.pan_tilt.timeout_s);
   EXPECT_EQ(example.pan_tilt.max_backoff_s, config_.pan_tilt.max_backoff_s);
   EXPECT_EQ(example.pan_tilt.angle_quantum_rad, config_.pan_tilt.angle_quantum_rad);
+  EXPECT_EQ(example.pan_tilt.angle_accuracy_deg, config_.pan_tilt.angle_accuracy_deg);
   EXPECT_EQ(example.pan_tilt.acceleration_sigma_rad_s2, config_.pan_tilt.acceleration_sigma_rad_s2);
   EXPECT_EQ(example.pan_tilt.max_repeat_s, config_.pan_tilt.max_repeat_s);
   EXPECT_EQ(example.camera.aspect, config_.camera.aspect);
@@ -1144,11 +1146,13 @@ TEST(NoiseFile, GivesItsValuesAndNamesItsMistakes) {
   std::string error;
   directory.write("noise.yaml",
                   "image_stamp_sigma_s: 2e-4\npan_tilt_sigma_rad: 1e-5\npixel_sigma_px: 0.3\n"
-                  "pan_tilt_scale_sigma: 0.01\n");
+                  "pan_tilt_scale_sigma: 0.01\n"
+                  "pan_tilt_accuracy_rad: 0.001\n");
   ASSERT_TRUE(load_noise(directory.path(), &noise, &error)) << error;
   EXPECT_EQ(noise.image_stamp_sigma_s, 2e-4);
   EXPECT_EQ(noise.pan_tilt_sigma_rad, 1e-5);
   EXPECT_EQ(noise.pan_tilt_scale_sigma, 0.01);
+  EXPECT_EQ(noise.pan_tilt_accuracy_rad, 0.001);
   EXPECT_FALSE(noise.telemetry_stamp_sigma_s);
   const std::string path =
       directory.write("noise.yaml", "pixel_sigma_px: 0.3\nimage_stamp_sigma_s: small\n");
