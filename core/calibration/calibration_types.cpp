@@ -8,7 +8,8 @@ namespace alidade {
 namespace {
 
 constexpr double kPupil_m = 0.05;  // usual, of lenses on heads
-// Spreads of the inverse distances, from 0: two sigmas, one to either side of the mean (departures.cpp).
+// Spreads of the inverse distances, from 0: two sigmas, one to either side of the mean
+// (departures.cpp).
 constexpr double kCovered = 4;
 constexpr const char* kDifferentDistances = "different distances";
 

@@ -1,8 +1,9 @@
 #pragma once
-// The camera frame of a calibration of one zoom, whose optical centre was free. Its axis goes through
-// the centre's estimate where the data show that the centre is not the prior's, else through that of
-// the prior; by definition, as the base is where the camera looks at zero pan and tilt. So the
-// centre is exact then, and what its error does to the other parameters is in their covariance:
+// The camera frame of a calibration of one zoom, whose optical centre was free. Its axis goes
+// through the centre's estimate where the data show that the centre is not the prior's, else
+// through that of the prior; by definition, as the base is where the camera looks at zero pan and
+// tilt. So the centre is exact then, and what its error does to the other parameters is in their
+// covariance:
 //   C' = C_held + (S - G) V (S - G)^T        C_held, S, V: centre_share.h
 // G is the turn of the axes with camera frame and base, c / f for c px, which is no error of any
 // direction. Pure; no allocation. Derivation: docs/calibration.md.
@@ -66,7 +67,8 @@ namespace internal {
   return out;
 }
 
-// exact: from the same data, with the prior's centre as exact. It lacks what the centre's error does.
+// exact: from the same data, with the prior's centre as exact. It lacks what the centre's error
+// does.
 [[nodiscard]] inline Calibration with_centre_error(const Calibration& exact,
                                                    const Calibration& free) {
   internal::CentreShare<kParameterCount> share = internal::share_in_frame(free);

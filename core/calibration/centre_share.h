@@ -2,10 +2,10 @@
 // CentreShare: what of a covariance C the optical centre brings, apart from the rest:
 //   C = C_held + S V S^T,   S = C_xc V^-1,   V = C_cc      c the centre, x all parameters
 // C_held is the covariance with the centre known exactly; S how the parameters follow the centre.
-// At a long focal length c px of it turn the axes by c / f, to well within 1e-3 of that: C is nearly
-// singular, C_held is not. So what enlarges a covariance does so in C_held. Units: px, and those of
-// the parameters, which begin with camera_column's. Pure; no allocation.
-// Derivation: docs/calibration.md.
+// At a long focal length c px of it turn the axes by c / f, to well within 1e-3 of that: C is
+// nearly singular, C_held is not. So what enlarges a covariance does so in C_held. Units: px, and
+// those of the parameters, which begin with camera_column's. Pure; no allocation. Derivation:
+// docs/calibration.md.
 
 #include <Eigen/LU>
 #include <algorithm>

@@ -72,8 +72,8 @@ double white_noise(const std::vector<double>& stamp) {
 }
 
 // Delays above the least one as lower_line.h wants them: their density near it is 1 / scale. That
-// is their mean if they are exponential. If far fewer come near it, beyond chance, as behind a relay
-// that delays evenly and keeps the order, the nearest tell.
+// is their mean if they are exponential. If far fewer come near it, beyond chance, as behind a
+// relay that delays evenly and keeps the order, the nearest tell.
 double delay_scale(std::vector<double> above, double mean) {
   constexpr std::size_t kLeastNear = 6;
   constexpr double kMostNear = 0.2;      // of the delays

@@ -244,7 +244,8 @@ double log_evidence(const MatrixXd& S, const VectorXd& g, const MatrixXd& root, 
 }
 
 // What the ripples' periods, which the evidence tells with an error of their own, add to the
-// covariance of c: D V D^T, D = d mean / d log period, V^-1 = -d^2 log evidence (Kass, Steffey 1989).
+// covariance of c: D V D^T, D = d mean / d log period, V^-1 = -d^2 log evidence (Kass, Steffey
+// 1989).
 MatrixXd covariance_of_periods(const MatrixXd& S, const VectorXd& g,
                                const std::vector<DeparturePart>& parts,
                                const std::vector<DeparturePrior>& priors, const MatrixXd& sure) {

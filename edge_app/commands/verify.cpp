@@ -1,6 +1,6 @@
-// `alidade verify`: replays a recording in OE and in PT mode, as `alidade replay` does, and compares
-// directions of places that are seen again. The room edge_app/verify compares; this file reads the
-// recording, prints and writes the report.
+// `alidade verify`: replays a recording in OE and in PT mode, as `alidade replay` does, and
+// compares directions of places that are seen again. The room edge_app/verify compares; this file
+// reads the recording, prints and writes the report.
 
 #include "edge_app/commands/verify.h"
 
@@ -22,6 +22,7 @@
 #include "edge_app/verify/verification.h"
 #include "edge_app/verify/verification_json.h"
 #include "edge_app/verify/verification_report.h"
+#include "edge_app/verify/verification_words.h"
 #include "platform/pan_tilt/recording_pan_tilt_source.h"
 
 namespace alidade {

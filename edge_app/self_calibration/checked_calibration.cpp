@@ -21,8 +21,8 @@ namespace {
 using internal::CentreShare;
 
 // common_s: the error common to all polls. It is in the known clock offset and in the new data
-// alike. A free optical centre stays where it is known to be; the others' sigmas are then those with
-// the centre held. Returns the centre's share of the known covariance.
+// alike. A free optical centre stays where it is known to be; the others' sigmas are then those
+// with the centre held. Returns the centre's share of the known covariance.
 CentreShare<kParameterCount> set_priors(const KnownCalibration& known, double inflation,
                                         double common_s, CalibrationOptions* adjustment) {
   const CentreShare<kParameterCount> centre =

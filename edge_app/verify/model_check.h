@@ -1,7 +1,8 @@
 #pragma once
 // Whether pictures and telemetry agree with the calibration, and if not, with what else they would.
-// All pairs of pictures together, with the orientations by all of telemetry's samples (pair_rows.h):
-//   r = X x + noise     x: errors of frames and parameters, each with the covariance that is claimed
+// All pairs of pictures together, with the orientations by all of telemetry's samples
+// (pair_rows.h):
+//   r = X x + noise     x: errors of frames and parameters, each with the claimed covariance
 // A departure is columns Z of unknown size a. With C the covariance of r that is claimed
 //   s = Z^T C^-1 r,   V = Z^T C^-1 Z,   s^T V^-1 s ~ chi-square if there is none    (score test)
 // Noise of the pictures is measured: by the residuals, and by how the pairs' parts of s scatter.
@@ -45,8 +46,8 @@ struct DepartureTest {
   double chi_square = 0;  // for `freedom`
   double log_chance = 0;  // of so much, if there is no such departure
   double scatter = 1;     // of the variance, by what a pair's places share; divides chi_square
-  // Size by this recording alone, and its sigma: px, 1, rad or s; of curves at their knots, in order
-  // of `at`. Truth minus calibration; telemetry minus truth for gears and drifts of its zero.
+  // Size by this recording alone, and its sigma: px, 1, rad or s; of curves at their knots, in
+  // order of `at`. Truth minus calibration; telemetry minus truth for gears and drifts of its zero.
   std::vector<double> size, sigma;
   std::vector<double> at;    // rad or s; empty: not a curve
   double claimed_sigma = 0;  // of a parameter, by the calibration

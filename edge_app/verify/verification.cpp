@@ -4,8 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/model/angle.h"
+#include "core/model/median.h"
+#include "edge_app/verify/verification_words.h"
 
 namespace alidade {
 namespace {
@@ -93,49 +96,6 @@ std::vector<PairRows> at_one_zoom(const std::vector<SeenFrame>& frames,
   return out;
 }
 
-const char* mode_of(OrientationFrom from) {
-  return from == OrientationFrom::kLandmarks ? "OE mode" : "PT mode";
-}
-
-std::string sentence_of(const ClaimComparison& comparison) {
-  const ClaimResult& r = comparison.result;
-  const std::string where =
-      fmt::format("{}, {}", name_of(comparison.kind), mode_of(comparison.from));
-  if (comparison.verdict == Verdict::kNotJudged) {
-    return fmt::format(
-        "{}: not judged; {} pairs, worth {:.0f} independent numbers ({} and {:.0f} "
-        "are needed)",
-        where, r.pairs, r.freedom, kLeastPairs, kLeastFreedom);
-  }
-  return fmt::format(
-      "{}: directions of the same place differ by {:.2f} times what sigma claims (95 %: {:.2f} to "
-      "{:.2f}){}",
-      where, r.ratio, r.low, r.high,
-      comparison.verdict == Verdict::kContradicted ? ", more than chance" : "");
-}
-
-double largest_sigmas(const DepartureTest& test) {
-  double out = 0;
-  for (std::size_t i = 0; i < test.size.size(); ++i) {
-    if (test.sigma[i] > 0) out = std::max(out, std::abs(test.size[i]) / test.sigma[i]);
-  }
-  return out;
-}
-
-std::string sentence_of(const ModelComparison& comparison) {
-  const DepartureTest& test = comparison.test;
-  const char* name = name_of(test.departure);
-  switch (comparison.verdict) {
-    case Verdict::kNotJudged:
-      return fmt::format("{}: not judged; this recording does not show it", name);
-    case Verdict::kHolds:
-      return fmt::format("{}: as calibrated; by this recording alone {}", name, size_of(test));
-    case Verdict::kContradicted:
-      return fmt::format("{}: contradicted; by this recording alone {}", name, size_of(test));
-  }
-  return name;
-}
-
 Verdict verdict_of(const DepartureTest& test, double log_limit) {
   if (test.freedom == 0) return Verdict::kNotJudged;
   if (test.log_chance < log_limit) return Verdict::kContradicted;
@@ -159,10 +119,8 @@ double motion_inflation(const VerifyInput& input, OrientationFrom from) {
   std::vector<double> variances;
   for (const SeenFrame& frame : input.frames)
     variances.push_back(orientation(frame, from).motion_covariance(0, 0));
-  const auto middle = variances.begin() + static_cast<std::ptrdiff_t>(variances.size() / 2);
-  std::nth_element(variances.begin(), middle, variances.end());
   const double duration_s = input.frames.back().time_s - input.frames.front().time_s;
-  const double of_frames = static_cast<double>(input.frames.size()) / *middle;
+  const double of_frames = static_cast<double>(input.frames.size()) / median(std::move(variances));
   const double of_samples = std::max(2.0, duration_s * input.telemetry_rate_hz) /
                             (input.telemetry_sigma_rad * input.telemetry_sigma_rad);
   return std::max(1.0, of_frames / of_samples);
@@ -214,176 +172,7 @@ std::vector<std::string> advice_for(const VerifyInput& input, const Verification
   return out;
 }
 
-const ClaimComparison* worst_claim(const Verification& verification) {
-  const ClaimComparison* worst = nullptr;
-  for (const ClaimComparison& each : verification.claims) {
-    if (each.verdict == Verdict::kNotJudged) continue;
-    const bool is_worse =
-        worst == nullptr ||
-        (each.verdict == Verdict::kContradicted) > (worst->verdict == Verdict::kContradicted) ||
-        (each.verdict == worst->verdict && each.result.ratio > worst->result.ratio);
-    if (is_worse) worst = &each;
-  }
-  return worst;
-}
-
-std::string summary_of(const Verification& v) {
-  const ClaimComparison* worst = worst_claim(v);
-  const std::string differ =
-      worst == nullptr
-          ? ""
-          : fmt::format(
-                "directions of the same place differ by {:.2f} times what "
-                "sigma claims (limit {:.2f}; {}, {})",
-                worst->result.ratio, worst->result.ratio / std::max(1e-9, worst->result.low),
-                name_of(worst->kind), mode_of(worst->from));
-  switch (v.verdict) {
-    case Verdict::kNotJudged:
-      return fmt::format(
-          "not judged: {} pairs of pictures show the same places again ({} are "
-          "needed)",
-          v.pairs, kLeastPairs);
-    case Verdict::kHolds:
-      return "sigmas hold: " + differ;
-    case Verdict::kContradicted:
-      break;
-  }
-  std::string out = "contradicted: ";
-  if (worst != nullptr && worst->verdict == Verdict::kContradicted) out += differ;
-  for (std::size_t i = 0; i < v.found.size(); ++i) {
-    if (i == 0 && out.size() > 14) out += "; ";
-    out += (i == 0 ? "likeliest cause: " : ", then: ");
-    out += fmt::format("{} ({})", name_of(v.found[i].departure), size_of(v.found[i]));
-  }
-  if (v.found.empty()) out += "; none of the causes that are known here explains it";
-  return out;
-}
-
 }  // namespace
-
-const char* to_string(Verdict verdict) {
-  switch (verdict) {
-    case Verdict::kHolds:
-      return "holds";
-    case Verdict::kContradicted:
-      return "contradicted";
-    case Verdict::kNotJudged:
-      return "not judged";
-  }
-  return "unknown";
-}
-
-const char* name_of(ReturnKind kind) {
-  switch (kind) {
-    case ReturnKind::kAll:
-      return "all returns";
-    case ReturnKind::kOtherSide:
-      return "returns from the other side";
-    case ReturnKind::kOtherSpeed:
-      return "returns at another speed";
-    case ReturnKind::kOtherPlace:
-      return "elsewhere in the picture";
-    case ReturnKind::kOtherZoom:
-      return "returns at another zoom";
-    case ReturnKind::kCount:
-      break;
-  }
-  return "unknown";
-}
-
-const char* name_of(Departure departure) {
-  switch (departure) {
-    case Departure::kFocalLength:
-      return "focal length";
-    case Departure::kDistortion:
-      return "radial distortion";
-    case Departure::kCentre:
-      return "optical centre";
-    case Departure::kAspect:
-      return "aspect, or the scale of one axis";
-    case Departure::kLineDelay:
-      return "line delay";
-    case Departure::kPanAxis:
-      return "pan axis";
-    case Departure::kTiltAxis:
-      return "tilt axis";
-    case Departure::kClockOffset:
-      return "clock offset";
-    case Departure::kPanGear:
-      return "pan's error over the angle (gear)";
-    case Departure::kTiltGear:
-      return "tilt's error over the angle (gear)";
-    case Departure::kPanPlay:
-      return "play of pan";
-    case Departure::kTiltPlay:
-      return "play of tilt";
-    case Departure::kFocalDrift:
-      return "focal length that drifts";
-    case Departure::kPanDrift:
-      return "zero of pan that drifts";
-    case Departure::kTiltDrift:
-      return "zero of tilt that drifts";
-    case Departure::kCount:
-      break;
-  }
-  return "unknown";
-}
-
-std::string size_of(const DepartureTest& test) {
-  if (test.size.empty()) return "no size";
-  const auto one = [&test](double unit, const char* name) {
-    return fmt::format("off by {:.3g} +- {:.2g}{}", unit * test.size.front(),
-                       unit * test.sigma.front(), name);
-  };
-  const auto curve = [&test](double unit, const char* name) {
-    // What all knots have in common is no error.
-    double mean = 0;
-    for (const double size : test.size) mean += size / static_cast<double>(test.size.size());
-    double square = 0;
-    double sigma = 0;
-    for (std::size_t i = 0; i < test.size.size(); ++i) {
-      square += (test.size[i] - mean) * (test.size[i] - mean);
-      sigma += test.sigma[i] * test.sigma[i];
-    }
-    const auto n = static_cast<double>(test.size.size());
-    return fmt::format("RMS {:.3g}{}, {:.1f} sigmas at most", unit * std::sqrt(square / n), name,
-                       largest_sigmas(test));
-  };
-  constexpr double kMilli = 1e3;
-  constexpr double kMicro = 1e6;
-  switch (test.departure) {
-    case Departure::kFocalLength:
-      return one(1, " px");
-    case Departure::kCentre:
-      return fmt::format("off by ({:.3g}, {:.3g}) +- ({:.2g}, {:.2g}) px", test.size[0],
-                         test.size[1], test.sigma[0], test.sigma[1]);
-    case Departure::kDistortion:
-    case Departure::kAspect:
-      return one(1, "");
-    case Departure::kLineDelay:
-      return one(kMicro, " us/row");
-    case Departure::kPanAxis:
-    case Departure::kTiltAxis:
-      return fmt::format("off by ({:.3g}, {:.3g}) +- ({:.2g}, {:.2g}) mrad", kMilli * test.size[0],
-                         kMilli * test.size[1], kMilli * test.sigma[0], kMilli * test.sigma[1]);
-    case Departure::kClockOffset:
-      return one(kMilli, " ms");
-    case Departure::kPanPlay:
-    case Departure::kTiltPlay:
-      return fmt::format("{:.3g} +- {:.2g} mrad", kMilli * std::abs(test.size.front()),
-                         kMilli * test.sigma.front());
-    case Departure::kPanGear:
-    case Departure::kTiltGear:
-    case Departure::kPanDrift:
-    case Departure::kTiltDrift:
-      return curve(kMilli, " mrad");
-    case Departure::kFocalDrift:
-      return curve(1, " px");
-    case Departure::kCount:
-      break;
-  }
-  return "";
-}
 
 Verification verify(const VerifyInput& input) {
   Verification out;
@@ -444,17 +233,6 @@ Verification verify(const VerifyInput& input) {
   if (!is_enough) out.found.clear();
   out.advice = advice_for(input, out);
   out.sentence = summary_of(out);
-  return out;
-}
-
-std::string verification_text(const Verification& verification) {
-  std::string out = fmt::format("{}\n", verification.sentence);
-  for (const ClaimComparison& comparison : verification.claims) {
-    if (comparison.result.pairs > 0) out += fmt::format("  {}\n", comparison.sentence);
-  }
-  for (const ModelComparison& comparison : verification.model)
-    out += fmt::format("  {}\n", comparison.sentence);
-  for (const std::string& advice : verification.advice) out += fmt::format("advice: {}\n", advice);
   return out;
 }
 

@@ -21,7 +21,6 @@ enum class Verdict {
   kContradicted,
   kNotJudged  // too few returns
 };
-[[nodiscard]] const char* to_string(Verdict verdict);
 
 // How the two pictures of a pair differ. A pair may differ in several ways.
 enum class ReturnKind : int { kAll, kOtherSide, kOtherSpeed, kOtherPlace, kOtherZoom, kCount };
@@ -69,13 +68,5 @@ inline constexpr double kLeastFreedom = 12;
 inline constexpr int kLeastPairs = 20;
 
 [[nodiscard]] Verification verify(const VerifyInput& input);
-
-// What a departure is called, and its size in words: "clock offset: 3.02 +- 0.05 ms".
-[[nodiscard]] const char* name_of(Departure departure);
-[[nodiscard]] std::string size_of(const DepartureTest& test);
-[[nodiscard]] const char* name_of(ReturnKind kind);
-
-// The verdict with its comparisons, for the terminal.
-[[nodiscard]] std::string verification_text(const Verification& verification);
 
 }  // namespace alidade

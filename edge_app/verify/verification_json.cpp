@@ -3,6 +3,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "edge_app/verify/verification_words.h"
+
 namespace alidade {
 namespace {
 

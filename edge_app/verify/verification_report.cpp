@@ -8,6 +8,7 @@
 #include "core/model/angle.h"
 #include "edge_app/output/html_page.h"
 #include "edge_app/output/svg_plot.h"
+#include "edge_app/verify/verification_words.h"
 
 namespace alidade {
 namespace {

@@ -269,7 +269,8 @@ OeStatus OeMode::answer_with_landmarks(const PredictedMotion& predicted, const S
   const SolvedMotion& solved = solution.solved;
   const bool has_telemetry = frame_.telemetry != FrameTelemetry::kNone;
   const bool withheld = has_telemetry && drift_.withholds();
-  FrameOrientation by_landmarks;
+  FrameOrientation unused;
+  FrameOrientation* by_landmarks = withheld ? &unused : out;
   const bool enclosed = frame_.telemetry == FrameTelemetry::kEnclosed;
   FrameMotion<double> motion = solution.motion;
   add(solved.correction, &motion);
@@ -313,14 +314,11 @@ OeStatus OeMode::answer_with_landmarks(const PredictedMotion& predicted, const S
     if (own_lens() != nullptr) own_lens()->to_frame(&sensitivity);
   }
   if (!make_frame_orientation(calibration_.of_answer(), frame_.time_s, OrientationMode::kOe,
-                              solved.inliers, in_base, covariance, sensitivity, &by_landmarks)) {
+                              solved.inliers, in_base, covariance, sensitivity, by_landmarks)) {
     return finish(has_telemetry ? OeStatus::kTooFew : OeStatus::kNoPrediction);
   }
-  if (own_lens() != nullptr) by_landmarks.zoom_rate_sigma = rate_sigma(solved);
-  if (!withheld) {
-    *out = by_landmarks;
-    note_landmarks_answer(solved, added);
-  }
+  if (own_lens() != nullptr) by_landmarks->zoom_rate_sigma = rate_sigma(solved);
+  if (!withheld) note_landmarks_answer(solved, added);
   if (enclosed) {
     // A contradiction does not get here: see solve_orientation().
     static_cast<void>(offset_.learn(frame_.time_s, innovation_of(predicted, solved)));

@@ -5,9 +5,9 @@
 // would have to turn for the same change in the picture, rad/s; landmark and map together are zero
 // for ground. Landmarks fall into one group, or into two of one rate each: clouds before a
 // mountain. Of two, telemetry says which is at rest; as long as it does not, nothing is claimed.
-// A group alone that is not at rest moves, if it does so steadily: play and sway are not steady, and
-// what goes with the angle is the gear's. Then a new map has to prove itself.
-// The constructor takes all memory; nothing else allocates, waits or throws. One thread.
+// A group alone that is not at rest moves, if it does so steadily: play and sway are not steady,
+// and what goes with the angle is the gear's. Then a new map has to prove itself. The constructor
+// takes all memory; nothing else allocates, waits or throws. One thread.
 
 #include <array>
 #include <cstddef>

@@ -100,7 +100,8 @@ struct Feed {
   double head_back_s = 0;  // the connection to the head begins anew then
   std::function<std::optional<double>(double)> zoom_at = {};  // in place of zoom, by the time
   std::function<bool(double)> blurred = {};                   // nothing is seen then
-  // The camera takes this share of the pictures, evenly; a converter sends the newest at each frame's time.
+  // The camera takes this share of the pictures, evenly; a converter sends the newest at each
+  // frame's time.
   double converted = 1;
 };
 

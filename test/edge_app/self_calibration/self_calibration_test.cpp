@@ -35,6 +35,11 @@ SelfCalibrationOptions options_for(const test::Simulation& s) {
   return test::calibration_options(s);
 }
 
+// The motion goes on, behind that of the first recording, with OE mode's tracks.
+Feed later_in_oe_mode() {
+  return {FrameTracks::Tracker::kOe, {}, 20, false, std::numeric_limits<double>::infinity(), 1000};
+}
+
 TEST(SelfCalibration, BeginsWithTheDataSheetAndPublishesOnceTheMotionSuffices) {
   const test::Simulation s = camera();
   const SelfCalibrationOptions options = options_for(s);
@@ -174,9 +179,7 @@ TEST(SelfCalibration, LaterMotionRefinesWhatIsKnown) {
   ASSERT_FALSE(first.empty());
   test::Simulation later = s;
   later.seed = 4;
-  const auto refined = feed(
-      &calibration, later,
-      {FrameTracks::Tracker::kOe, {}, 20, false, std::numeric_limits<double>::infinity(), 1000});
+  const auto refined = feed(&calibration, later, later_in_oe_mode());
   ASSERT_FALSE(refined.empty());
   const Calibration& before = first.back().calibration->calibration;
   const Calibration& after = refined.back().calibration->calibration;
@@ -201,9 +204,7 @@ TEST(SelfCalibration, FindsTheOpticalCentreAndKeepsIt) {
               5 * parameter_sigma(before, Parameter::kRadialDistortion));
   test::Simulation later = s;
   later.seed = 4;
-  const auto refined = feed(
-      &calibration, later,
-      {FrameTracks::Tracker::kOe, {}, 20, false, std::numeric_limits<double>::infinity(), 1000});
+  const auto refined = feed(&calibration, later, later_in_oe_mode());
   ASSERT_FALSE(refined.empty());
   const Calibration& after = refined.back().calibration->calibration;
   EXPECT_EQ(after.camera.centre_offset(), before.camera.centre_offset());
@@ -233,9 +234,7 @@ TEST(SelfCalibration, MakesAFreshCalibrationOfTheMotionSinceItWasAskedFor) {
   test::Simulation turned = s;
   turned.pan_axis = (s.pan_axis + Eigen::Vector3d(0, 0.005, 0)).normalized();
   EXPECT_TRUE(calibration.ask_for_fresh());
-  const auto published = feed(
-      &calibration, turned,
-      {FrameTracks::Tracker::kOe, {}, 20, false, std::numeric_limits<double>::infinity(), 1000});
+  const auto published = feed(&calibration, turned, later_in_oe_mode());
   ASSERT_FALSE(published.empty());
   EXPECT_GE(published[0].time_s, options.schedule.first_try_s);
   EXPECT_LT(published[0].time_s, 12);  // of motion, from when on it is held against the old one
@@ -291,9 +290,7 @@ TEST(SelfCalibration, ReplacesTheCalibrationOfACameraThatWasTurnedOnItsMount) {
   turned.pan_axis = (s.pan_axis + Eigen::Vector3d(0, 0.005, 0)).normalized();
   turned.tilt_axis = (s.tilt_axis + Eigen::Vector3d(0.005, 0, 0)).normalized();
   turned.duration_s = 40;
-  const auto published = feed(
-      &calibration, turned,
-      {FrameTracks::Tracker::kOe, {}, 20, false, std::numeric_limits<double>::infinity(), 1000});
+  const auto published = feed(&calibration, turned, later_in_oe_mode());
   ASSERT_FALSE(published.empty());
   expect_truth(turned, published.back().calibration->calibration);
   EXPECT_THAT(calibration.take_messages(),

@@ -9,6 +9,7 @@
 
 #include "edge_app/verify/verification_json.h"
 #include "edge_app/verify/verification_report.h"
+#include "edge_app/verify/verification_words.h"
 
 namespace alidade {
 namespace {

@@ -16,8 +16,8 @@ constexpr double kPixel = 1e-4;  // rad
 constexpr double kFrame_s = 0.04;
 constexpr int kLandmarks = 100;
 
-// Landmarks before a camera that looks ahead. The map follows those that `followed` says; all of one kind move at
-// `cloud_px_s` to the right.
+// Landmarks before a camera that looks ahead. The map follows those that `followed` says; all of
+// one kind move at `cloud_px_s` to the right.
 struct World {
   double cloud_px_s = 1;
   double telemetry_px = 0.3;

@@ -1,0 +1,26 @@
+#pragma once
+// A verification in words: names, sizes with their units, a sentence for each comparison and for the
+// whole. Pure; allocates.
+
+#include <string>
+
+#include "edge_app/verify/verification.h"
+
+namespace alidade {
+
+[[nodiscard]] const char* to_string(Verdict verdict);
+[[nodiscard]] const char* name_of(ReturnKind kind);
+
+// What a departure is called, and its size in words: "clock offset: 3.02 +- 0.05 ms".
+[[nodiscard]] const char* name_of(Departure departure);
+[[nodiscard]] std::string size_of(const DepartureTest& test);
+
+[[nodiscard]] std::string sentence_of(const ClaimComparison& comparison);
+[[nodiscard]] std::string sentence_of(const ModelComparison& comparison);
+// The verdict, with the number that matters and the likeliest causes.
+[[nodiscard]] std::string summary_of(const Verification& verification);
+
+// The verdict with its comparisons, for the terminal.
+[[nodiscard]] std::string verification_text(const Verification& verification);
+
+}  // namespace alidade
