@@ -415,14 +415,14 @@ DeparturePrior possible_curve(const MatrixXd& information, const VectorXd& score
   constexpr double kStep = 1.3;
   const PartData data = eliminate_others(
       information, score, joint_root(parts, priors, sure, score.size(), part), parts[part]);
-  const double longest = kLongestCurve * static_cast<double>(parts[part].count - 1);
+  double length = kLongestCurve * static_cast<double>(parts[part].count - 1);
   DeparturePrior best;
-  for (double length = longest; length >= kShortestCurve; length /= kStep) {
+  while (length >= kShortestCurve) {
     const MatrixXd root = curve_root(parts[part], length);
     const double gain =
         gain_of(root.transpose() * data.S * root, root.transpose() * data.g, amplitude);
-    if (best.amplitude > 0 && !(gain > best.gain)) continue;
-    best = {amplitude, length, gain};
+    if (!(best.amplitude > 0) || gain > best.gain) best = {amplitude, length, gain};
+    length /= kStep;
   }
   return best;
 }

@@ -213,9 +213,9 @@ void TelemetryDepartures::find_play(const AdjustmentData& data, const Adjustment
       last[0] = {scale * (motor - dragged.angle), 0.5 * scale * dragged.direction,
                  scale * dragged.sigma_rad};
     }
-    const double steps =
-        std::clamp(std::ceil((residual.time_s - from_s) / kStep_s), 1.0, kMostSteps);
-    for (double step = 1; step <= steps; ++step) {
+    const int steps = static_cast<int>(
+        std::clamp(std::ceil((residual.time_s - from_s) / kStep_s), 1.0, kMostSteps));
+    for (int step = 1; step <= steps; ++step) {
       const double time = from_s + step / steps * (residual.time_s - from_s);
       const double angle = state.trajectory.position(time).vector()[axis];
       const PlayedAngle dragged = reading.next(angle);

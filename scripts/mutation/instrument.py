@@ -105,7 +105,9 @@ def check_binding(text, begin, end, mutant):
 
 
 def check_statement(text, begin, mutant):
-    """A statement must begin where one can."""
+    """A statement must begin where one can, and declare nothing: its name would end with the switch's brackets."""
+    if re.match(r"(?:static|const|constexpr|auto|using)\b", mutant.original):
+        raise ListError(f"{mutant.id}: its original declares a name: take the value, or where it is used, in {mutant.file}")
     before = re.sub(r"//[^\n]*", "", text[max(0, begin - 400):begin]).rstrip()
     if not (before.endswith((";", "{", "}", ")", ":")) or before.endswith("else")) or before.endswith("= {"):
         raise ListError(f"{mutant.id}: ends like a statement and does not begin like one in {mutant.file}")

@@ -254,6 +254,12 @@ class Instrument(unittest.TestCase):
                                ("x += a + b;", "a + b"), ("x = a + b * c;", "b * c"), ("x = 1e-3 * a;", "1e-3 * a")):
             self.text_of(text, (original, "m", ""))
 
+    def test_refuses_a_declaration(self):
+        for declaration in ("const double x = 2;", "constexpr double kX = 2;", "auto x = 2;"):
+            with self.assertRaises(catalogue.ListError, msg=declaration):
+                self.text_of(f"f(); {declaration}", (declaration, declaration.replace("2", "3"), ""))
+        self.text_of("f(); constant(2);", ("constant(2);", "", ""))
+
     def test_refuses_mutants_that_overlap(self):
         with self.assertRaises(catalogue.ListError):
             self.text_of("x = a + b + c;", ("a + b", "a", ""), ("x = a", "y = a", ""))
