@@ -82,6 +82,10 @@ def operators(text):
 def check_binding(text, begin, end, mutant):
     """An expression gets brackets of its own, and they must not change what the original means."""
     inside = flat(text[begin:end])
+    if not mutant.mutated.strip() or re.match(r"(?:else|case|default)\b", mutant.original) or OPERATOR.fullmatch(inside.split()[-1]):
+        raise ListError(f"{mutant.id}: its original, or what it becomes, is neither an expression nor a statement: {mutant.original}")
+    if text[end:end + 1] == "(":
+        raise ListError(f"{mutant.id}: its original ends with the name of a function: take in its arguments in {mutant.file}")
     if "," in inside:
         raise ListError(f"{mutant.id}: its original is a list, and no expression: {mutant.original}")
     if re.search(r"[()\[\]{}]", inside):
@@ -106,6 +110,8 @@ def check_binding(text, begin, end, mutant):
 
 def check_statement(text, begin, mutant):
     """A statement must begin where one can, and declare nothing: its name would end with the switch's brackets."""
+    if re.match(r"(?:else|case|default)\b", mutant.original):
+        raise ListError(f"{mutant.id}: its original is part of a statement of {mutant.file}: take the statement behind it")
     if re.match(r"(?:static|const|constexpr|auto|using)\b", mutant.original):
         raise ListError(f"{mutant.id}: its original declares a name: take the value, or where it is used, in {mutant.file}")
     before = re.sub(r"//[^\n]*", "", text[max(0, begin - 400):begin]).rstrip()

@@ -260,6 +260,13 @@ class Instrument(unittest.TestCase):
                 self.text_of(f"f(); {declaration}", (declaration, declaration.replace("2", "3"), ""))
         self.text_of("f(); constant(2);", ("constant(2);", "", ""))
 
+    def test_refuses_what_is_neither_an_expression_nor_a_statement(self):
+        for text, original, mutated in (("if (a || b) f();", "a ||", "b ||"), ("x = a + b;", "a + b", ""),
+                                        ("if (a) f(); else if (b) g();", "else if (b)", "else"), ("x = f(a);", "f", "g"),
+                                        ("switch (a) { case 1: f(); }", "case 1: f();", "case 1:;")):
+            with self.assertRaises(catalogue.ListError, msg=text):
+                self.text_of(text, (original, mutated, ""))
+
     def test_refuses_mutants_that_overlap(self):
         with self.assertRaises(catalogue.ListError):
             self.text_of("x = a + b + c;", ("a + b", "a", ""), ("x = a", "y = a", ""))
