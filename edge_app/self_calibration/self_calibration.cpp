@@ -57,7 +57,7 @@ SelfCalibration::SelfCalibration(const SelfCalibrationOptions& options, Calibrat
     nodes_.begin_with(archive->zoom_curve(), free_centre ? &stored->calibration : nullptr);
   }
   zooms_ = zooms_ || !nodes_.empty();
-  first->zoom_curve = nodes_.curve();
+  first->zoom_curve = nodes_.believed_curve();
   first->of_this_connection = stored == nullptr;
   publication_.begin_with(first);
 }
@@ -132,14 +132,18 @@ void SelfCalibration::judge_agreement(const FrameTracks& tracks) {
     return;
   }
   auto withdrawn = std::make_shared<PublishedCalibration>();
+  // Its values are still the best guess. A data sheet that states a value as exact does not make
+  // it better known than it was.
   withdrawn->calibration = publication_.calibration();
-  withdrawn->calibration.covariance = options_.data_sheet.covariance;
+  withdrawn->calibration.covariance += options_.data_sheet.covariance;
+  withdrawn->telemetry_error = publication_.object()->telemetry_error;
   withdrawn->name = publication_.object()->name + ", withdrawn";
   messages_.say(fmt::format(
       "landmarks contradict telemetry in {} of {} frames: the calibration {} is "
       "withdrawn (was the camera moved on its mount, or its lens?); calibrating anew",
       disagreement_.contradicted_frames(), disagreement_.frames(), publication_.object()->name));
   publication_.withdraw(withdrawn);
+  nodes_.doubt();
   begin_anew();
 }
 
@@ -216,7 +220,7 @@ void SelfCalibration::publish(const CheckedCalibration& checked) {
   fresh->calibrated = true;
   fresh->map = map_from_keyframes(checked.result, session_.keyframes(checked.result));
   fresh->name = "live";
-  fresh->zoom_curve = nodes_.curve();
+  fresh->zoom_curve = nodes_.believed_curve();
   fresh->telemetry_error = checked.result.telemetry_error;
   const CalibrationQuality& quality = checked.result.quality;
   messages_.say(

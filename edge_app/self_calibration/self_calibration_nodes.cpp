@@ -92,7 +92,7 @@ void SelfCalibration::look_for_stored() {
   // A calibration without a zoom, which holds for any, would have fitted already.
   if (stored != nullptr && !stored->calibration.zoom) stored = nullptr;
   auto found = std::make_shared<PublishedCalibration>();
-  const bool on_curve = nodes_.curve().at(*zoom_.reading(), &found->calibration) &&
+  const bool on_curve = nodes_.believed_curve().at(*zoom_.reading(), &found->calibration) &&
                         (stored == nullptr || has_free_centre(stored->calibration));
   const double f_sigma = relative_focal_length_sigma(found->calibration);
   const bool by_curve = on_curve && f_sigma <= kSharpFocalLength;
@@ -122,7 +122,7 @@ void SelfCalibration::look_for_stored() {
                                ? stored->notes.telemetry_error
                                : publication_.object()->telemetry_error;
   found->calibrated = true;
-  found->zoom_curve = nodes_.curve();
+  found->zoom_curve = nodes_.believed_curve();
   // For a stored one the connection is unknown.
   found->of_this_connection = by_curve && nodes_.clock_is_known();
   messages_.say(fmt::format("zoom {}: the calibration {} holds", *zoom_.reading(), found->name));

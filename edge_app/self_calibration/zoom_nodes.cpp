@@ -48,6 +48,7 @@ void ZoomNodes::take(const ZoomAddition& addition) {
   node_ = addition.node;
   visited_ = true;
   clock_is_known_ = true;
+  is_doubted_ = false;
 }
 
 void ZoomNodes::begin_anew(const Calibration& alone) { take({ZoomCurve(), alone, {}}); }

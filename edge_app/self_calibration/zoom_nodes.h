@@ -32,7 +32,10 @@ class ZoomNodes {
   // another connection.
   void begin_with(const ZoomCurve& curve, const Calibration* first);
 
+  // All nodes that were taken, also while they are doubted.
   [[nodiscard]] const ZoomCurve& curve() const { return curve_; }
+  // What may be used: the curve, or an empty one while it is doubted.
+  [[nodiscard]] const ZoomCurve& believed_curve() const { return is_doubted_ ? none_ : curve_; }
   [[nodiscard]] bool empty() const { return curve_.empty() && !first_; }
   // Whether this dwell has a node already.
   [[nodiscard]] bool has_visit() const { return visited_; }
@@ -40,6 +43,9 @@ class ZoomNodes {
 
   void leave();  // the zoom has moved
   void clock_began_anew() { clock_is_known_ = false; }
+  // A calibration of the curve was withdrawn. All nodes share axes and clock, so none is believed
+  // until a new calibration has been found to agree with them (take()), or stands alone.
+  void doubt() { is_doubted_ = true; }
 
   // alone: from the data of this dwell, none of which was added before; its zoom is set. options:
   // the priors that went into it. False, with one line in *error: it does not belong to this
@@ -57,6 +63,8 @@ class ZoomNodes {
   bool visited_ = false;
   std::optional<int> node_;  // index in the curve, of this visit
   bool clock_is_known_ = true;
+  bool is_doubted_ = false;
+  ZoomCurve none_;
 };
 
 }  // namespace alidade

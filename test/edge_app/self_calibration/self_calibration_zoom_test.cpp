@@ -59,6 +59,10 @@ class ZoomingCamera : public ::testing::Test {
     }
     how.from_s = from_s_;
     how.first_frame = first_frame_;
+    if (contradicting_) {
+      how.tracker = FrameTracks::Tracker::kOe;
+      how.contradicting_from_s = 0;
+    }
     from_s_ += duration_s + 4;
     first_frame_ += 1000;
     return test::feed(calibration, s, how);
@@ -70,7 +74,8 @@ class ZoomingCamera : public ::testing::Test {
     return std::log(c.camera.focal_length / zoomed(reading).focal_length);
   }
 
-  double jitter_ = 0;  // sigma of the readings
+  double jitter_ = 0;           // sigma of the readings
+  bool contradicting_ = false;  // OE mode finds that landmarks contradict telemetry
   std::mt19937 random_{8};
   double from_s_ = 0;
   std::int64_t first_frame_ = 0;
@@ -230,6 +235,27 @@ TEST_F(ZoomingCamera, AnotherCameraBeginsANewCurveAfterTwoContradictions) {
   ASSERT_FALSE(second.empty());
   EXPECT_EQ(nodes(second), 2);
   test::expect_truth(other(0, 8), second.back().calibration->calibration);
+}
+
+// Whoever moved the camera on its mount moved it for all zooms.
+TEST_F(ZoomingCamera, NoZoomOfAWithdrawnCurveIsUsedUntilACalibrationAgrees) {
+  ASSERT_FALSE(dwell(0, zoomed(0)).empty());
+  ASSERT_FALSE(dwell(200, zoomed(200, 4)).empty());
+  static_cast<void>(calibration_.take_messages());
+  contradicting_ = true;
+  const auto withdrawn = dwell(200, zoomed(200, 5), 4);
+  contradicting_ = false;
+  ASSERT_FALSE(withdrawn.empty());
+  EXPECT_FALSE(withdrawn.back().calibration->calibrated);
+  EXPECT_TRUE(withdrawn.back().calibration->zoom_curve.empty());
+  EXPECT_THAT(calibration_.take_messages(), Contains(HasSubstr("is withdrawn")));
+  for (const double reading : {0.0, 200.0, 100.0}) {
+    EXPECT_THAT(dwell(reading, zoomed(reading), 1), IsEmpty()) << reading;
+  }
+  const auto again = dwell(0, zoomed(0, 8), 20);
+  ASSERT_FALSE(again.empty());
+  EXPECT_TRUE(again.back().calibration->calibrated);
+  EXPECT_EQ(nodes(again), 3) << "the first visits agree with it, and count again";
 }
 
 // Its reading does not follow the lens: f is higher there than at a higher reading.
