@@ -120,6 +120,23 @@ TEST(PicturePose, CountsNoiseThatIsLargerThanClaimed) {
   EXPECT_LT(trials.inflated_squares / n, 1.05 + 4 * std::sqrt(2 / n));
 }
 
+// Its uncertain motion has hardly a part about the optical axis, which lies across both axes here.
+TEST(PicturePose, AMountTurnsAboutItsAxesAlone) {
+  constexpr double kTurn_rad = 2e-4;
+  SeenPicture picture;
+  picture.pan = 0.4;
+  picture.focal_length = 5000;
+  picture.line_delay = 3e-5;
+  PoseKnowledge knowledge = picture.knowledge(true);
+  knowledge.motion_doubt = {kTurn_rad, 1e-4};
+  std::mt19937_64 random(11);
+  const PicturePose pose = find_pose(simulate(picture, {}, &random), knowledge);
+  ASSERT_EQ(pose.status, PoseStatus::kOk);
+  // 80 matches of 0.2 px at 300 px from the middle would leave 7e-5 rad.
+  EXPECT_LT(std::sqrt(pose.motion_covariance(2, 2)), 0.03 * kTurn_rad);
+  EXPECT_GT(std::sqrt(pose.motion_covariance(0, 0)), 0.01 * kTurn_rad);
+}
+
 TEST(PicturePose, OfNoneOneOrTwoMatchesThereIsNone) {
   const SeenPicture picture = lively_picture(5000, 1, 0.2, 0);
   std::mt19937_64 random(3);

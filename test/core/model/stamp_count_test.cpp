@@ -83,6 +83,18 @@ TEST(StampCount, ABacklogThatGrowsAndIsWorkedOffIsNoCount) {
   }
 }
 
+// It only grows, and faster than a rise that alone would show a count; but two and a half steps a second are no whole ones.
+TEST(StampCount, ABacklogThatGrowsByNoWholeStepsIsNoCount) {
+  for (const double steps_per_s : {1.75, 2.5, 2.6}) {
+    const auto backlog_s = [&](double time_s) { return steps_per_s * kStep_s * time_s; };
+    for (unsigned seed = 1; seed <= 20; ++seed) {
+      const double until_s = 0.9 * StampCount::kApart_s / (steps_per_s * kStep_s);
+      EXPECT_FALSE(shown_by(kStep_s, counts, backlog_s, until_s, seed))
+          << steps_per_s << ", " << seed;
+    }
+  }
+}
+
 TEST(StampCount, ASenderThatStoodStillIsNoCount) {
   const auto stalls_s = [](double time_s) { return std::floor(time_s / 8) * 1.0; };
   EXPECT_FALSE(shown_by(kStep_s, counts, stalls_s, 120, 1));
