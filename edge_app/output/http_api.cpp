@@ -288,7 +288,7 @@ std::shared_ptr<const ZoomCurve> zoom_curve_of(const HttpApiSources& sources) {
 }
 
 void add_api_routes(HttpServer* server, const HttpApiSources& sources) {
-  sources.live->set_on_news([server] { server->wake(); });
+  sources.live->add_on_news([server] { server->wake(); });
   if (sources.target_lines != nullptr)
     sources.target_lines->set_on_news([server] { server->wake(); });
   server->get("/healthz", HttpAccess::kOpen,
