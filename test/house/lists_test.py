@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Lists that nothing else compares: is each source built, does each type of link keep the contract, is each scheme's name looked up, has
 each section and each kind that a configuration can name its line in the test of the examples, and each kind and key a seed of the fuzzer,
-is each value of the API described, has the page a sentence for all that a calibration does and needs?"""
+is each value and route of the API described and given what it tells, has the page a sentence for all that a calibration does and needs?"""
 import pathlib
 import re
 import unittest
@@ -205,6 +205,22 @@ class Answers(unittest.TestCase):
     def test_other_json_is_described(self):
         self.check(self.description, [*files("*_json.cpp", "edge_app/output"),
                                       *(f"edge_app/output/{name}.cpp" for name in ("http_api", "pixel_query", "status_page"))])
+
+    def test_routes_are_described(self):
+        routes = {(method, path) for source in files("*.cpp", "edge_app/output")
+                  for method, path in re.findall(r'server->(get|post)\(\s*"(/[^"]*)"', read(source))}
+        self.assertGreater(len(routes), 15)
+        described = {(method, path) for path, methods in self.description["paths"].items() for method in methods}
+        self.assertEqual(routes, described, "the routes of edge_app/output are not the paths of openapi.yaml")
+
+    def test_what_they_come_from_is_handed_over(self):
+        """A handler takes an empty member for something that is switched off."""
+        struct = re.search(r"struct HttpApiSources \{(.*?)\n\};", read("edge_app/output/http_api.h"), re.DOTALL)[1]
+        members = re.findall(r"(\w+)(?: = [^;]+)?;", re.sub(r"//.*", "", struct))
+        self.assertGreater(len(members), 12)
+        given = set(re.findall(r"\bsources\.(\w+) = ", read("edge_app/commands/run.cpp")))
+        self.assertFalse(set(members) - given, "edge_app/commands/run.cpp: run_live() sets of HttpApiSources no " +
+                         ", ".join(sorted(set(members) - given)))
 
 
 if __name__ == "__main__":
