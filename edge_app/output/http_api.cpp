@@ -73,9 +73,10 @@ ServerResponse history(const HttpApiSources& sources) {
 ServerResponse calibration(const HttpApiSources& sources) {
   const auto newest = sources.live->newest();
   if (!newest || !newest->calibrated)
-    return http_error(404,
-                      "no calibration is in use for this camera at this zoom: there is none yet, or "
-                      "it was withdrawn; calibration.activity of /api/v1/status says which");
+    return http_error(
+        404,
+        "no calibration is in use for this camera at this zoom: there is none yet, or "
+        "it was withdrawn; calibration.activity of /api/v1/status says which");
   Json json = calibration_json(unpack(newest->camera));
   if (const auto curve = zoom_curve_of(sources)) json["zoom_curve"] = zoom_curve_json(*curve);
   if (const auto error = sources.telemetry_error ? sources.telemetry_error() : nullptr) {

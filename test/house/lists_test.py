@@ -169,6 +169,16 @@ class PageWords(unittest.TestCase):
             self.assertEqual(told, said, f"edge_app/output/page/words.js, {constant}, has not the words of published_calibration.cpp")
 
 
+class Activities(unittest.TestCase):
+    def test_are_in_the_metrics_and_in_the_list_of_fields(self):
+        code = dict(re.findall(r'case CalibrationActivity::(\w+):\s+return "(.+)";', read("edge_app/record/published_calibration.cpp")))
+        self.assertGreater(len(code), 4)
+        metrics = set(re.findall(r"CalibrationActivity::(\w+)", read("edge_app/output/service_metrics.cpp")))
+        self.assertEqual(set(code), metrics, "edge_app/output/service_metrics.cpp, alidade_calibration_activity")
+        field = next(field for field in yaml.safe_load(read("edge_app/record/record_fields.yaml")) if field["name"] == "calibration")
+        self.assertEqual(set(code.values()), {str(word) for word in field["enum"]}, "edge_app/record/record_fields.yaml, calibration")
+
+
 class Answers(unittest.TestCase):
     """Of HTTP: what an object inside an answer holds is described. test/system/http_test.py asks that of the answer itself only."""
 
