@@ -19,6 +19,7 @@
 #include <string>
 #include <vector>
 
+#include "core/realtime/telemetry/telemetry_buffer.h"
 #include "edge_app/check/clock_check.h"
 #include "edge_app/check/finding.h"
 #include "edge_app/check/spread.h"
@@ -29,11 +30,11 @@ namespace alidade {
 
 struct TelemetryNeeds {
   std::string source;
-  std::optional<double> rate_hz;      // of the requested polls
-  double max_repeat_s = 0.1;          // TelemetryLimits
-  double max_gap_s = 0.5;             // TelemetryLimits
-  double max_extrapolation_s = 0.25;  // TelemetryLimits
-  double angle_sigma_rad = 1e-4;      // TelemetryNoise, as used by run
+  std::optional<double> rate_hz;  // of the requested polls
+  double max_repeat_s = TelemetryLimits().max_repeat_s;
+  double max_gap_s = TelemetryLimits().max_gap_s;
+  double max_extrapolation_s = TelemetryLimits().max_extrapolation_s;
+  double angle_sigma_rad = 1e-4;  // TelemetryNoise, as used by run
   double resolution_rad = 0;
   double focal_length_px = 0;  // 0: unknown
   double clock_offset_s = 0;   // images are looked up this much later

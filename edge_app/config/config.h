@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "core/realtime/telemetry/telemetry_buffer.h"  // TelemetryLimits
 #include "edge_app/config/detectors_config.h"
 #include "edge_app/config/mqtt_config.h"
 #include "edge_app/config/pan_tilt_config.h"
@@ -69,7 +70,8 @@ struct RealtimeConfig {
   int priority = 0;       // SCHED_FIFO priority, see priority_of(); 0: normal scheduling
   int cpu = -1;           // -1: any
   bool lock_memory = false;
-  double max_extrapolation_s = 0.25;  // s beyond the newest trusted angle
+  // s beyond the newest trusted angle.
+  double max_extrapolation_s = TelemetryLimits().max_extrapolation_s;
 };
 
 struct OutputConfig {

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "core/realtime/telemetry/telemetry_buffer.h"  // TelemetryLimits
 #include "edge_app/config/head_config.h"
 #include "edge_app/config/yaml_section.h"
 #include "platform/system/link_rules.h"
@@ -39,7 +40,7 @@ struct PanTiltConfig {
   double angle_accuracy_deg = 0;  // deg, the maker's claim, one standard deviation; 0: no claim
   double acceleration_sigma_rad_s2 = 0.1;  // rad/s^2, assumed where the samples do not show it
   // s, longest time between two measurements of the device; 0: each answer is a new measurement.
-  double max_repeat_s = 0.1;
+  double max_repeat_s = TelemetryLimits().max_repeat_s;
 };
 
 // `path`: of the configuration file; relative paths start at its folder. Throws ConfigError.

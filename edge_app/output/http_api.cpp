@@ -73,7 +73,10 @@ ServerResponse history(const HttpApiSources& sources) {
 ServerResponse calibration(const HttpApiSources& sources) {
   const auto newest = sources.live->newest();
   if (!newest || !newest->calibrated)
-    return http_error(404, "there is no calibration for this camera at this zoom yet");
+    return http_error(
+        404,
+        "no calibration is in use for this camera at this zoom: there is none yet, or "
+        "it was withdrawn; calibration.activity of /api/v1/status says which");
   Json json = calibration_json(unpack(newest->camera));
   if (const auto curve = zoom_curve_of(sources)) json["zoom_curve"] = zoom_curve_json(*curve);
   if (const auto error = sources.telemetry_error ? sources.telemetry_error() : nullptr) {
@@ -288,7 +291,7 @@ std::shared_ptr<const ZoomCurve> zoom_curve_of(const HttpApiSources& sources) {
 }
 
 void add_api_routes(HttpServer* server, const HttpApiSources& sources) {
-  sources.live->set_on_news([server] { server->wake(); });
+  sources.live->add_on_news([server] { server->wake(); });
   if (sources.target_lines != nullptr)
     sources.target_lines->set_on_news([server] { server->wake(); });
   server->get("/healthz", HttpAccess::kOpen,

@@ -62,7 +62,9 @@ bool LiveState::write(const OrientationRecord& record) {
       if (lines_.size() > options_.max_lines) lines_.pop_front();
     }
   }
-  if (followed) on_news_();
+  if (followed) {
+    for (const std::function<void()>& on_news : on_news_) on_news();
+  }
   return true;
 }
 

@@ -74,9 +74,9 @@ class LiveState final : public RecordSink {
   [[nodiscard]] const std::string& start_id() const { return start_id_; }
   [[nodiscard]] double started_s() const { return started_s_; }
 
-  // Must be called before the first record. write() calls on_news when a reader can take something;
-  // on_news must not wait.
-  void set_on_news(std::function<void()> on_news) { on_news_ = std::move(on_news); }
+  // Must be called before the first record. write() calls each on_news when a reader can take
+  // something; none may wait.
+  void add_on_news(std::function<void()> on_news) { on_news_.push_back(std::move(on_news)); }
 
   // What came for a reader since its last take().
   struct News {
@@ -119,7 +119,7 @@ class LiveState final : public RecordSink {
   const std::string start_id_;
   const double started_s_;
 
-  std::function<void()> on_news_ = [] {};
+  std::vector<std::function<void()>> on_news_;
 
   mutable PriorityMutex mutex_;  // the output thread goes first
   std::optional<OrientationRecord> newest_;

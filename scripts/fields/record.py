@@ -9,14 +9,19 @@ LIST = "edge_app/record/record_fields.yaml"
 BY = by(LIST)
 KEYS = {"name", "type", "unit", "null_if", "says", "more", "value", "of", "enum", "minimum", "maximum", "absent", "start", "ros", "columns", "members"}
 TYPES = {"number", "integer", "boolean", "word", "array", "object"}
-# Those of CONVENTIONS.md: a time in ms or an angle in degrees would be the only one of a record.
-UNITS = ("s", "s/row", "1/s", "px", "rad", "rad^2", "rad/s", "rad/s^2")
+# Those of CONVENTIONS.md, and how a name ends: a time in ms or an angle in degrees would be the only one of a record.
+UNITS = {"s": "_s", "s/row": "_s", "1/s": "_per_s", "px": ("_px", "_row"), "rad": "_rad", "rad^2": "_rad2", "rad/s": "_rad_s",
+         "rad/s^2": "_rad_s2", "grey levels": "_grey"}
 CPP = {"number": "double", "integer": "std::int64_t", "boolean": "bool", "word": "std::string"}
 
 
 def fields_of_list():
     fields = []
     for field, where in entries(LIST, KEYS, ("name", "type", "says", "value", "ros"), TYPES, UNITS):
+        for one in (field, *field.get("members", ())):
+            ending = UNITS.get(one.get("unit"), "")
+            if not one["name"].endswith(ending):
+                raise ListError(f"{where}: {one['name']} is in {one['unit']}, so its name ends in {ending if isinstance(ending, str) else ending[0]}")
         if field["type"] == "array" and not field.get("columns"):
             raise ListError(f"{where}: an array has columns")
         # In a ROS message only a float64 and a string can say that there is no value.

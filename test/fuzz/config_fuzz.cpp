@@ -14,6 +14,13 @@ void require_sound_head(const HeadConfig& head) {
   FUZZ_REQUIRE(!head.link.address.empty() && is_baud(head.link.baud));
 }
 
+void require_sound_broker(const MqttOptions& mqtt) {
+  FUZZ_REQUIRE(!mqtt.host.empty() && is_within(mqtt.port, 1, 65535));
+  FUZZ_REQUIRE(is_within(mqtt.qos, 0, 2) && is_within(mqtt.keep_alive_s, 5, 3600));
+  FUZZ_REQUIRE(is_within(mqtt.timeout_s, 0.1, 3600) && is_within(mqtt.max_backoff_s, 0.1, 3600));
+  FUZZ_REQUIRE(is_within(mqtt.orientation_rate_hz, 0, 1000));
+}
+
 void require_sound(const Config& config) {
   const VideoConfig& video = config.video;
   FUZZ_REQUIRE(is_within(video.width, 0, 65536) && is_within(video.height, 0, 65536));
@@ -30,16 +37,25 @@ void require_sound(const Config& config) {
   FUZZ_REQUIRE(is_within(pan_tilt.angle_sigma_rad.value_or(0), 0, 0.1));
   FUZZ_REQUIRE(is_within(pan_tilt.angle_quantum_rad, 0, 0.1));
   FUZZ_REQUIRE(is_within(pan_tilt.angle_accuracy_deg, 0, 5));
+  FUZZ_REQUIRE(is_within(pan_tilt.acceleration_sigma_rad_s2, 0, 1000));
   FUZZ_REQUIRE(is_within(pan_tilt.max_repeat_s, 0, 10));
   if (pan_tilt.type == PanTiltConfig::Type::kHead) require_sound_head(pan_tilt.head);
   FUZZ_REQUIRE(is_within(config.camera.focal_length_px.value_or(1), 1, 1e8));
   FUZZ_REQUIRE(is_within(config.camera.aspect, 0.5, 2));
   FUZZ_REQUIRE(is_within(config.camera.line_delay_s, -1e-3, 1e-3));
   FUZZ_REQUIRE(is_within(config.camera.centre_sigma_px.value_or(0), 0, 1e4));
+  FUZZ_REQUIRE(is_within(config.calibration.zoom_tolerance.value_or(0), 0, 1e6));
+  FUZZ_REQUIRE(is_within(config.calibration.clock_offset_sigma_s.value_or(0), 0, 1));
+  FUZZ_REQUIRE(is_within(config.scene_map.interval_s, 0.1, 3600));
+  FUZZ_REQUIRE(is_within(config.scene_map.zero_sigma_rad, 1e-7, 0.5));
+  FUZZ_REQUIRE(is_within(config.realtime.max_extrapolation_s, 0, 10));
+  const double repeat_s = pan_tilt.max_repeat_s;
+  FUZZ_REQUIRE(repeat_s == 0 || repeat_s < config.realtime.max_extrapolation_s);
   FUZZ_REQUIRE(is_within(config.realtime.priority, 0, 99));
   FUZZ_REQUIRE(is_within(config.realtime.cpu, -1, 1023));
   FUZZ_REQUIRE(!config.tracking.targets || config.tracking.targets->validate());
   FUZZ_REQUIRE(!config.calibration.file.empty() || config.camera.focal_length_px);
+  if (config.mqtt) require_sound_broker(*config.mqtt);
 }
 
 }  // namespace

@@ -10,13 +10,15 @@ KINDS = "core/model/lens/distortion.h"
 PARTS = (("edge_app/output/openapi.yaml", "    ZoomCurve:", "    Calibration:"),
          ("edge_app/output/openapi.yaml", "    Calibration:", "    FrameNumber:"),
          ("edge_app/output/page/calibration.js", "const kParameters = [", "];"),
+         ("edge_app/output/page/calibration.js", "export async function showCalibrationInUse(", "}"),
          ("ros_wrapper/alidade_msgs/msg/Calibration.msg", None, None),
          ("ros_wrapper/alidade_msgs/msg/ZoomNode.msg", None, None),
          ("ros_wrapper/alidade_ros/include/alidade_ros/record.h", "struct ZoomNodeValues {", "};"),
          ("ros_wrapper/alidade_ros/include/alidade_ros/record.h", "struct CalibrationValues {", "};"),
          ("ros_wrapper/alidade_ros/src/record.cpp", "ZoomNodeValues zoom_node(", "}\n"),
          ("ros_wrapper/alidade_ros/src/record.cpp", "bool parse_calibration(", None),
-         ("ros_wrapper/alidade_ros/src/conversions.cpp", None, None),
+         ("ros_wrapper/alidade_ros/src/conversions.cpp", "sensor_msgs::CameraInfo camera_info(", "}\n"),
+         ("ros_wrapper/alidade_ros/src/conversions.cpp", "alidade_msgs::Calibration calibration(", "}\n"),
          ("ros_wrapper/alidade_ros/src/edge_bridge.cpp", "bool same_camera(", "}\n"),
          ("test/simulator/camera_model.cpp", None, None),
          ("test/support/calibration_errors.py", None, None),
@@ -38,11 +40,17 @@ def part(file, begin, end):
     return text[:text.index("\n" + end)] if end else text
 
 
+# Those that name the enumerators of Parameter: kRadialDistortion.
+PARTS_BY_PARAMETER = (("edge_app/verify/departure_columns.cpp", "std::vector<DepartureColumns> all_departures(", "}\n"),)
+
+
 class DistortionTerms(unittest.TestCase):
     def test_are_in_every_interface(self):
         names = terms()
         self.assertTrue(names)
-        missing = [f"{file}{f' ({begin.strip()})' if begin else ''} lacks {name}" for file, begin, end in PARTS for name in names
+        enumerators = ["k" + "".join(word.title() for word in name.split("_")) for name in names]
+        missing = [f"{file}{f' ({begin.strip()})' if begin else ''} lacks {name}"
+                   for parts, wanted in ((PARTS, names), (PARTS_BY_PARAMETER, enumerators)) for file, begin, end in parts for name in wanted
                    if not re.search(rf"\b{name}\b", part(file, begin, end))]
         self.assertFalse(missing, "\n".join(missing))
 

@@ -135,6 +135,7 @@ class GeneratedFields(unittest.TestCase):
                       (NEW.replace("type: number", "type: array"), "sun_rad: an array has columns"),
                       (NEW.replace("type: number", "type: object"), "sun_rad: an object has members"),
                       (NEW.replace("unit: rad", "unit: ms"), "sun_rad: unit is ms; it may be s, "),
+                      (NEW.replace("unit: rad", "unit: s"), "sun_rad: sun_rad is in s, so its name ends in _s"),
                       (NEW.replace("type: number", "type: object\n  members: [{name: a, unit: deg}]"), "sun_rad: unit is deg; it may be s, "),
                       (NEW.replace("sun_rad", "zoom"), "zoom stands there twice"),
                       (NEW.replace("type: number", "type: integer"), "sun_rad: an integer that may be null has ros: as: presence"),

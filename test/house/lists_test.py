@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Lists that nothing else compares: is each source built, does each type of link keep the contract, is each scheme's name looked up, has
-each kind that a configuration can name its line in the test of the examples, and a seed of the fuzzer, is each value of the API
-described?"""
+each section and each kind that a configuration can name its line in the test of the examples, and each kind and key a seed of the fuzzer,
+is each value and route of the API described and given what it tells, has the page a sentence for all that a calibration does and needs?"""
 import pathlib
 import re
 import unittest
@@ -80,6 +80,59 @@ class PanTiltTypes(unittest.TestCase):
                 self.assertTrue(any(name.startswith(one) for name in names), f"PanTiltSourceContract has no case whose name begins with {one}")
 
 
+WHERE_SECTIONS = "test/edge_app/config/config_test.cpp, `sections` of TheExamplesShowEveryKey"
+SEEDS = "test/fuzz/corpus/config"
+
+
+def sections_of_the_examples():
+    text = read("test/edge_app/config/config_test.cpp")
+    begin = text.index("TheExamplesShowEveryKey")
+    return text[begin:text.index("\nTEST", begin)]
+
+
+def seeds():
+    return [path.read_text(encoding="utf-8", errors="replace") for path in sorted((TOP / SEEDS).iterdir())]
+
+
+def keys_of_example(path):
+    """(section, key) of each line, commented out or not, as TheExamplesShowEveryKey takes them: keys of a section within a section count
+    as the outer one's."""
+    keys, section = set(), ""
+    for line in read(path).splitlines():
+        line = line[2:] if line.startswith("# ") else line
+        if match := re.match(r"([ #]*)([a-z_0-9]+):", line):
+            section = section if match[1] else match[2]
+            keys.update({(section, match[2])} if match[1] else ())
+    return keys
+
+
+def keys_of_seed(text):
+    def within(section, content):
+        pairs = content.items() if isinstance(content, dict) else ()
+        return {(section, key) for key, _ in pairs}.union(*(within(section, inner) for _, inner in pairs))
+
+    try:
+        top = yaml.safe_load(text)
+    except yaml.YAMLError:
+        return set()  # a seed of what is no configuration
+    return set().union(*(within(section, content) for section, content in top.items())) if isinstance(top, dict) else set()
+
+
+class ConfiguredKeys(unittest.TestCase):
+    def test_of_each_section_are_in_the_test_of_the_examples(self):
+        """Which then shows that an example has each key of the section."""
+        sections = re.findall(r'top\.section\("(\w+)"\)', read("edge_app/config/config.cpp"))
+        self.assertGreater(len(sections), 8)
+        for section in sections:
+            self.assertTrue(f'{{"{section}", "{{' in sections_of_the_examples(), f"{WHERE_SECTIONS}: no {section}")
+
+    def test_have_a_seed_of_the_fuzzer(self):
+        shown = set().union(*(keys_of_example(path) for path in files("*.yaml", "edge_app/examples")))
+        self.assertGreater(len(shown), 100)
+        missing = shown - set().union(*map(keys_of_seed, seeds()))
+        self.assertFalse(missing, f"{SEEDS}/every_key or another seed: no " + ", ".join(sorted(map(".".join, missing))))
+
+
 class ConfiguredKinds(unittest.TestCase):
     def setUp(self):
         self.kinds = {
@@ -97,16 +150,33 @@ class ConfiguredKinds(unittest.TestCase):
                 self.assertTrue(any(re.search(pattern, text, re.MULTILINE) for text in texts), f"{where}: no {section} with {kind}")
 
     def test_have_a_line_in_the_test_of_the_examples(self):
-        test = "TheExamplesShowEveryKey"
-        text = read("test/edge_app/config/config_test.cpp")
-        begin = text.index(test)
-        self.assert_all((r'\{"SECTION", "\{type: KIND\b', r'\{"SECTION", "\{KIND: '), [text[begin:text.index("\nTEST", begin)]],
-                        f"test/edge_app/config/config_test.cpp, `sections` of {test}")
+        self.assert_all((r'\{"SECTION", "\{type: KIND\b', r'\{"SECTION", "\{KIND: '), [sections_of_the_examples()], WHERE_SECTIONS)
 
     def test_have_a_seed_of_the_fuzzer(self):
-        folder = "test/fuzz/corpus/config"
-        seeds = [path.read_text(encoding="utf-8", errors="replace") for path in sorted((TOP / folder).iterdir())]
-        self.assert_all((r"^SECTION:\s+\{?type: KIND\b", r"^SECTION:(\n  .*)*\n  KIND:|^SECTION: .*\bKIND: "), seeds, folder)
+        self.assert_all((r"^SECTION:\s+\{?type: KIND\b", r"^SECTION:(\n  .*)*\n  KIND:|^SECTION: .*\bKIND: "), seeds(), SEEDS)
+
+
+class PageWords(unittest.TestCase):
+    """As StatusPage.SaysInWordsWhatEachStatusMeans asks of a record's status."""
+
+    def test_for_what_a_calibration_does_and_needs(self):
+        code, page = read("edge_app/record/published_calibration.cpp"), read("edge_app/output/page/words.js")
+        for kind, constant in (("CalibrationActivity", "kActivities"), ("CalibrationNeed", "kNeeds")):
+            told = set(re.findall(rf'case {kind}::\w+:\s+return "(.+)";', code))
+            begin = page.index(f"export const {constant} = {{")
+            said = set(re.findall(r"^  '?(.+?)'?:(?:$| ')", page[begin:page.index("\n}", begin)], re.MULTILINE))
+            self.assertGreater(len(told), 4)
+            self.assertEqual(told, said, f"edge_app/output/page/words.js, {constant}, has not the words of published_calibration.cpp")
+
+
+class Activities(unittest.TestCase):
+    def test_are_in_the_metrics_and_in_the_list_of_fields(self):
+        code = dict(re.findall(r'case CalibrationActivity::(\w+):\s+return "(.+)";', read("edge_app/record/published_calibration.cpp")))
+        self.assertGreater(len(code), 4)
+        metrics = set(re.findall(r"CalibrationActivity::(\w+)", read("edge_app/output/service_metrics.cpp")))
+        self.assertEqual(set(code), metrics, "edge_app/output/service_metrics.cpp, alidade_calibration_activity")
+        field = next(field for field in yaml.safe_load(read("edge_app/record/record_fields.yaml")) if field["name"] == "calibration")
+        self.assertEqual(set(code.values()), {str(word) for word in field["enum"]}, "edge_app/record/record_fields.yaml, calibration")
 
 
 class Answers(unittest.TestCase):
@@ -145,6 +215,22 @@ class Answers(unittest.TestCase):
     def test_other_json_is_described(self):
         self.check(self.description, [*files("*_json.cpp", "edge_app/output"),
                                       *(f"edge_app/output/{name}.cpp" for name in ("http_api", "pixel_query", "status_page"))])
+
+    def test_routes_are_described(self):
+        routes = {(method, path) for source in files("*.cpp", "edge_app/output")
+                  for method, path in re.findall(r'server->(get|post)\(\s*"(/[^"]*)"', read(source))}
+        self.assertGreater(len(routes), 15)
+        described = {(method, path) for path, methods in self.description["paths"].items() for method in methods}
+        self.assertEqual(routes, described, "the routes of edge_app/output are not the paths of openapi.yaml")
+
+    def test_what_they_come_from_is_handed_over(self):
+        """A handler takes an empty member for something that is switched off."""
+        struct = re.search(r"struct HttpApiSources \{(.*?)\n\};", read("edge_app/output/http_api.h"), re.DOTALL)[1]
+        members = re.findall(r"(\w+)(?: = [^;]+)?;", re.sub(r"//.*", "", struct))
+        self.assertGreater(len(members), 12)
+        given = set(re.findall(r"\bsources\.(\w+) = ", read("edge_app/commands/run.cpp")))
+        self.assertFalse(set(members) - given, "edge_app/commands/run.cpp: run_live() sets of HttpApiSources no " +
+                         ", ".join(sorted(set(members) - given)))
 
 
 if __name__ == "__main__":

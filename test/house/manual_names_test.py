@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Do the functions that READMEs and docs name exist, and stand where they say?"""
+"""Do the functions and tests that READMEs and docs name exist, and stand where they say? Do their links lead somewhere?"""
 import functools
 import pathlib
 import re
@@ -41,6 +41,27 @@ def homes():
     return homes
 
 
+@functools.lru_cache(None)
+def tests():
+    """Suite.Name, as gtest or ctest has it."""
+    names = {f"{suite}.{name}" for path, text in sources().items() if path.startswith(("test/", "ros_wrapper/"))
+             for suite, name in re.findall(r"^TEST(?:_F|_P)?\(\s*(\w+),\s*(\w+)\)", text, re.MULTILINE)}
+    lists = "\n".join(path.read_text(encoding="utf-8") for path in sorted((TOP / "test").rglob("CMakeLists.txt")))
+    return names.union(re.findall(r"NAME (\w+\.\w+)", lists),
+                       (f"System.{name}" for name in re.findall(r"alidade_(?:system|soak)_test\((\w+) ", lists)))
+
+
+def anchors(page):
+    """Of a page's headings, as GitHub makes them."""
+    headings = re.findall(r"^#+ (.+)$", without_code((TOP / page).read_text(encoding="utf-8")), re.MULTILINE)
+    headings = [re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading) for heading in headings]
+    return {re.sub(r"[^\w\- ]", "", heading.strip().lower()).replace(" ", "-") for heading in headings}
+
+
+def without_code(text):
+    return re.sub(r"```.*?```", "", text, flags=re.DOTALL)
+
+
 class Names(unittest.TestCase):
     def setUp(self):
         self.assertGreater(len(sources()), 700)
@@ -78,6 +99,33 @@ class Names(unittest.TestCase):
                     wrong.append(f"{page}: {name} in {file}")
         self.assertGreater(seen, 40)
         self.assertFalse(wrong, "not there: " + ", ".join(wrong))
+
+    def test_of_tests_exist(self):
+        """`Suite.Name`, where there is such a suite; `Suite.Begin*`."""
+        suites = {name.split(".")[0] for name in tests()}
+        self.assertGreater(len(suites), 300)
+        named = [(page, name) for page, text in pages().items() for name in re.findall(r"`([A-Z]\w+\.[A-Z]\w+\*?)`", text)
+                 if name.split(".")[0] in suites]
+        self.assertGreater(len(named), 40)
+        wrong = [f"{page}: {name}" for page, name in named
+                 if not (name in tests() or name.endswith("*") and any(one.startswith(name[:-1]) for one in tests()))]
+        self.assertFalse(wrong, "no such tests: " + ", ".join(wrong))
+
+
+class Links(unittest.TestCase):
+    def test_lead_to_files_and_headings(self):
+        wrong, seen = [], 0
+        for page in pages():
+            for link in re.findall(r"\]\(([^)\s]+)\)", without_code((TOP / page).read_text(encoding="utf-8"))):
+                if re.match(r"\w+:", link):
+                    continue
+                seen += 1
+                file, _, heading = link.partition("#")
+                target = (TOP / page).parent / file if file else TOP / page
+                if not target.exists() or heading and heading not in anchors(target.resolve().relative_to(TOP)):
+                    wrong.append(f"{page}: {link}")
+        self.assertGreater(seen, 250)
+        self.assertFalse(wrong, "nothing there: " + ", ".join(wrong))
 
 
 if __name__ == "__main__":

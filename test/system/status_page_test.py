@@ -397,7 +397,7 @@ class StatusPage(SystemTest):
         _, address = self.start(self.config(camera, detectors={"motion": {}}))
         self.browser.get(address)
         self.wait_for_text("link", "^live$")
-        self.wait_for_text("health", r"Detector of motion[1-9]\d* pictures judged, \d+ not; \d+ boxesPictures that detectors left out\d")
+        self.wait_for_text("health", r"Detector motion[1-9]\d* pictures judged, \d+ not; \d+ boxesPictures that detectors left out\d")
         self.wait_for_text("health", r"Video link[\d.]+ a second; newest now; back again 0 times"
                                      r"Pan/tilt link[\d.]+ a second; newest now; back again 0 times")
         camera.end(signal.SIGKILL)

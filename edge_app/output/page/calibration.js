@@ -51,7 +51,7 @@ export async function showCalibrationInUse(status) {
     calibrationSeen = key;
   }
   say('calibration-caption', record.calibrated
-    ? `in use for ${duration(status.calibration.age_s)}; \u00b1 one standard deviation` : 'none yet: values of the data sheet');
+    ? `in use for ${duration(status.calibration.age_s)}; \u00b1 one standard deviation` : 'none in use: values of the data sheet, or of the one that was withdrawn');
 }
 
 onNewProcess(() => { calibrationSeen = null; });

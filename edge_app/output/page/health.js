@@ -38,7 +38,7 @@ function detectorRows(detectors) {
   const {replaced, ...kinds} = detectors;
   return [
     ...Object.entries(kinds).filter(([, counters]) => counters).map(([name, {pictures, unjudged, boxes}]) => {
-      return [`Detector of ${name === 'onnx' ? 'network' : name}`, `${pictures - unjudged} pictures judged, ${unjudged} not; ${boxes} boxes`];
+      return [`Detector ${name}`, `${pictures - unjudged} pictures judged, ${unjudged} not; ${boxes} boxes`];
     }),
     ['Pictures that detectors left out', String(replaced)],
   ];

@@ -667,6 +667,12 @@ TEST_F(ConfigTest, TheExampleOfHeadsIsRead) {
   EXPECT_TRUE(load_config(ALIDADE_HEAD_EXAMPLE, &config_, &error)) << error;
 }
 
+// Of a seed that is refused, the fuzzer would not get to the keys behind the slip.
+TEST_F(ConfigTest, TheFuzzersSeedWithEveryKeyIsRead) {
+  std::string error;
+  EXPECT_TRUE(load_config(ALIDADE_CONFIG_SEED, &config_, &error)) << error;
+}
+
 TEST_F(ConfigTest, TheExampleIsReadAndShowsTheDefaults) {
   ::setenv("CAMERA_PASSWORD", "secret", 1);
   Config example;

@@ -262,16 +262,19 @@ TEST(LiveState, TellsOfNewsOnceARecordIsThereForAReader) {
   int told = 0;
   std::size_t taken = 0;
   LiveState::Reader* following = nullptr;
-  state.set_on_news([&] {
+  int told_another = 0;
+  state.add_on_news([&] {
     ++told;
     taken += following->take().lines.size();
   });
+  state.add_on_news([&] { ++told_another; });
   write(&state, 1, 3);
   EXPECT_EQ(told, 0) << "nobody follows";
   LiveState::Reader reader(&state);
   following = &reader;
   write(&state, 4, 8);
   EXPECT_EQ(told, 5);
+  EXPECT_EQ(told_another, 5) << "each who asked to be told";
   EXPECT_EQ(taken, 5U);
 }
 
