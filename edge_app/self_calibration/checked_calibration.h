@@ -50,9 +50,9 @@ struct KnownCalibration {
 };
 
 struct CheckedCalibration {
-  CalibrationResult result;  // without the zoom
-  std::string refusal;       // empty: it may be published
-  double hold_out = 0;       // root mean square of the normalised residuals in held-out frames
+  CalibrationResult result;          // without the zoom
+  std::string refusal;               // empty: it may be published
+  std::optional<double> hold_out;    // held_out_error(); empty: nothing could be compared
   std::vector<std::string> remarks;  // what was known beforehand but not used
   CalibrationOptions adjustment;     // as used, with its priors
   double common_clock_sigma_s = 0;   // s, of the clock offset: the error that all polls share
