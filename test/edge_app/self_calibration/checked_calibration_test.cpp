@@ -21,7 +21,8 @@ using ::testing::IsEmpty;
 using ::testing::Lt;
 using ::testing::Optional;
 
-// held_out_factor: of the sigmas that the tracker states in the frames that are held out; 0: it finds nothing there.
+// held_out_factor: of the sigmas that the tracker states in the frames that are held out; 0: it
+// finds nothing there.
 // polled_width_s: of the interval in which each angle was asked for; 0: numbered by the device.
 CalibrationSession session_of(const test::Simulation& s, double held_out_factor,
                               double polled_width_s = 0) {
