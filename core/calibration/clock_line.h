@@ -21,8 +21,8 @@ struct ClockInput {
   std::optional<double> stamp_sigma_s;                // as stated; empty: from the residuals
   std::optional<double> period_s;                     // if known; ticks are counted with it
   std::optional<double> period_sigma_s;               // > 0: the known period joins the fit
-  bool one_sided = false;  // stamps are never early
-  bool own_times = false;  // no clock behind the stamps: not steady
+  bool one_sided = false;                             // stamps are never early
+  bool own_times = false;                             // no clock behind the stamps: not steady
 };
 
 // If not steady, period_s, middle_s and both their sigmas are 0.

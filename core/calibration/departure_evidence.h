@@ -40,7 +40,7 @@ struct DepartureFit {
   std::vector<DeparturePrior> priors;  // for each part
   Eigen::VectorXd mean;                // of c; zero where no part is present
   Eigen::MatrixXd covariance;          // of c; likewise
-  double unknowns = 0;  // trace(P S): how many numbers the data determine
+  double unknowns = 0;                 // trace(P S): how many numbers the data determine
 
   [[nodiscard]] bool any() const;  // a part is present
 };

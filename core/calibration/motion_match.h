@@ -15,8 +15,8 @@ namespace alidade::internal {
 
 // The median motion of the tracks from one frame to another.
 struct ImageMotion {
-  double from_s = 0;  // image clock
-  double to_s = 0;    // image clock
+  double from_s = 0;      // image clock
+  double to_s = 0;        // image clock
   Vector2<double> shift;  // px
 };
 

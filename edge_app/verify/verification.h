@@ -17,7 +17,7 @@
 namespace alidade {
 
 enum class Verdict {
-  kHolds,  // no comparison contradicts the sigmas
+  kHolds,         // no comparison contradicts the sigmas
   kContradicted,  // a comparison does, beyond chance
   // Fewer than kLeastPairs pairs or kLeastFreedom independent numbers; or, of a departure, a test
   // that would show only twenty times the claimed sigma.
@@ -59,12 +59,12 @@ struct VerifyInput {
 
 struct Verification {
   Verdict verdict = Verdict::kNotJudged;
-  std::string sentence;             // the verdict in words
-  std::vector<std::string> advice;  // what motion would serve
-  int pairs = 0;                    // of pictures
-  int places = 0;                   // see ModelCheckResult
-  double noise_ratio = 1;           // see ModelCheckResult
-  double chance_limit = 0;          // a comparison less probable than this contradicts; 0 to 1
+  std::string sentence;                 // the verdict in words
+  std::vector<std::string> advice;      // what motion would serve
+  int pairs = 0;                        // of pictures
+  int places = 0;                       // see ModelCheckResult
+  double noise_ratio = 1;               // see ModelCheckResult
+  double chance_limit = 0;              // a comparison less probable than this contradicts; 0 to 1
   std::vector<ClaimComparison> claims;  // each kind for landmarks, then for telemetry; may be empty
   std::vector<ModelComparison> model;   // each departure; empty as claims: there are no pairs
   std::vector<DepartureTest> found;     // see ModelCheckResult; empty if pairs < kLeastPairs
