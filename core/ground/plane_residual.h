@@ -6,7 +6,9 @@
 //   horizon          the direction's elevation
 //   point, bearing   direction minus the sight, in its tangent basis
 //   length           distance of the two places minus the datum
-//   upright          direction of (place of the foot, height) minus the head's sight, likewise
+//   upright          direction of (place of the foot, height) minus the head's sight, in that one's
+//                    tangent basis
+// In m or rad, as the datum.
 
 #include <Eigen/Core>
 #include <vector>
@@ -25,12 +27,12 @@ struct PlaneState {
 
 // With size 1 the second row is 0 and its variance is 1.
 struct DatumResidual {
-  int size = 2;
+  int size = 2;  // numbers in r: 1 or 2
   Vector2<double> r = Vector2<double>::Zero();
   Matrix<double, 2, kPlaneParameterCount> J_plane = Matrix<double, 2, kPlaneParameterCount>::Zero();
   Matrix<double, 2, 3> J_sight_look = Matrix<double, 2, 3>::Zero();  // by z of the sight's look
-  Matrix<double, 2, 3> J_other_look = Matrix<double, 2, 3>::Zero();
-  Matrix2<double> covariance = Matrix2<double>::Identity();  // from the datum's own errors
+  Matrix<double, 2, 3> J_other_look = Matrix<double, 2, 3>::Zero();  // by z of the other's look
+  Matrix2<double> covariance = Matrix2<double>::Identity();          // from the datum's own errors
 };
 
 // roots: of the looks' covariances. False: the datum is not defined on this plane, such as a foot
