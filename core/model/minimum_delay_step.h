@@ -4,7 +4,7 @@
 // first early one on.
 //   rise  no item comes down to the line for settle_s
 //   fall  some items come before the line
-// It is a step only if the minimum residuals of two neighbouring halves of settle_s agree.
+// Either is a step only if the minimum residuals of two neighbouring halves of settle_s agree.
 // Fixed memory, trivially copyable, no allocation, no exceptions. All times are host seconds.
 // Statistics: docs/clocks.md.
 
@@ -49,7 +49,7 @@ class MinimumDelayStep {
   }
 
   void add_late(double receive_s, double residual_s) { late_.add(receive_s, residual_s, false); }
-  // The same item; mean_s: usual mean delay above the line.
+  // The same item, after add_late(). mean_s: usual mean delay above the line.
   void suspect(double receive_s, double residual_s, double mean_s) {
     stretch_.add(receive_s, residual_s, std::max(mean_s, resolution_s_));
   }

@@ -1,9 +1,10 @@
 #pragma once
 // StampJumps: detects stamps that jump although the items come evenly.
 //   jump_i = (sender_i - sender_(i-1)) - (receive_i - receive_(i-1))
-// A varying delay moves the arrival. An item left out moves both, except at the end of a backlog.
-// If the arrival came at the usual interval and the stamp did not, the stamp jumped, and the line
-// through the stamps is at once off by that much. Slow wander is DelayWander's task.
+// A varying delay moves the arrival. An item that is left out moves arrival and stamp, except at
+// the end of a backlog. If the arrival came at the usual interval and the stamp did not, the stamp
+// jumped, and the line through the stamps is off by the jump at once. Slow wander is DelayWander's
+// task.
 // Fixed memory, trivially copyable, no allocation, no exceptions; one thread. All times are
 // seconds.
 
