@@ -3,8 +3,9 @@
 // image belong to the board. A marker counts if it and its neighbours predict each other's places;
 // wrongly read markers do not.
 // Before OpenCV 4.6 a board with an even number of rows had its colours, and so its markers, the
-// other way round. The majority of neighbours in the images so far decides. Until then no marker
-// counts, as a part of a board may fit both layouts. One thread at a time.
+// other way round. The majority of neighbours in the images so far decides which layout it is.
+// Before the decision no marker counts, as a part of a board may fit both layouts. One thread at a
+// time.
 
 #include <array>
 #include <cstddef>
