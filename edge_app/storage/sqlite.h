@@ -1,7 +1,7 @@
 #pragma once
 // RAII for SQLite's handles: a connection, a statement, a transaction. A connection keeps its first
-// failure until asked, and after it statements do nothing. So one check at the end covers many
-// steps. One thread at a time.
+// failure until it is asked for it; after a failure statements do nothing. So one check at the end
+// covers many steps. One thread at a time.
 // Changes go to a write-ahead log (NAME-wal, NAME-shm) or are unlogged. A rollback journal is never
 // written and never believed: one beside a database was put there by others, and SQLite would
 // delete the files that it names.

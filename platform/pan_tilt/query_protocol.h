@@ -62,14 +62,15 @@ class QueryProtocol {
   // A reading is within a turn; `begin` is the index of one of the bytes. kNone if there are no
   // bytes.
   [[nodiscard]] virtual Answer find(std::string_view bytes) = 0;
-  // Bytes that reset the device's command parser and that it does not answer; usually none.
+  // Bytes that reset the device's command parser and that the device does not answer; usually none.
   [[nodiscard]] virtual std::string give_up() = 0;
 
-  // Unrequested bytes came. If that matters, next() returns a fence, as it does after every
-  // kQueriesPerFence queries: after one surplus answer, each answer is that of the previous query.
+  // To be called when unrequested bytes came. A protocol that needs fences then returns one by
+  // next(), as after every kQueriesPerFence queries. Reason: after one surplus answer, each answer
+  // is that of the previous query.
   virtual void doubt() = 0;
-  // How the device deviates from the protocol and how that is handled, in one line; empty if it
-  // does not.
+  // How the device deviates from the protocol and how this is handled, in one line. Empty: the
+  // device does not deviate.
   [[nodiscard]] virtual std::string peculiarity() const { return {}; }
   // Over UDP, true: each datagram is a frame (VISCA's header) and is searched by itself. False for
   // lines of text.
@@ -92,7 +93,7 @@ class QueryProtocol {
   return angle_deg >= -360 && angle_deg <= 360;
 }
 
-// If zoom is read too: readings of pan and tilt per reading of zoom.
+// Readings of pan and tilt per reading of zoom, if zoom is read.
 constexpr int kReadingsPerZoom = 10;
 
 constexpr int kQueriesPerFence = 64;
