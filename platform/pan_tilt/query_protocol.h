@@ -1,12 +1,13 @@
 #pragma once
 // QueryProtocol: the queries to a pan/tilt head, and how its answers are found in the received
 // bytes. heads.h lists the protocols. No I/O, no clock, no exceptions; QuerySource does the I/O.
-// One query is outstanding at a time. next() returns it. find() looks for its answer in all bytes
-// since it was sent (at most kMaxAnswer; of more, the oldest are dropped) and takes the latest of
-// several. Anything else is skipped: noise, partial frames, echoes, late answers to another query,
-// unsolicited lines. After give_up(), next() returns a fence, a query with a different answer, so
-// that a late answer is not taken for that of a later query. Angles are degrees as the device
-// counts them; QuerySource applies signs and zeros. Fences: docs/derivations.md.
+// One query is outstanding at a time; next() returns it. find() looks for the answer in all bytes
+// since the query was sent (at most kMaxAnswer; of more, the oldest are dropped) and takes the
+// latest of several answers. Anything else is skipped: noise, partial frames, echoes, late answers
+// to another query, unsolicited lines. After give_up(), next() returns a fence, a query with a
+// different answer, so that a late answer is not taken for the answer to a later query. Angles are
+// degrees as the device counts them; QuerySource applies signs and zeros. Fences:
+// docs/derivations.md.
 
 #include <cstddef>
 #include <cstdint>
@@ -56,8 +57,8 @@ class QueryProtocol {
   [[nodiscard]] virtual const char* name() const = 0;
   // On a new connection, before its first query: nothing is known of the device.
   virtual void restart() = 0;
-  // Never empty: an answer is awaited after each query. After give_up() its bytes differ from those
-  // before.
+  // The next query. Its bytes are never empty: an answer is awaited after each query. After
+  // give_up() they differ from the bytes of the query before.
   [[nodiscard]] virtual Query next() = 0;
   // A reading is within a turn; `begin` is the index of one of the bytes. kNone if there are no
   // bytes.
