@@ -36,7 +36,7 @@ struct LocalizableFrame {
   OrientationRecord record;  // with time; without orientation only if there is no telemetry
   // Camera frame; set if the record has no orientation.
   std::array<double, 3> angular_velocity_rad_s{};
-  ImageView image;                                 // lent with its slot
+  ImageView image;  // lent with its slot
   ImageSlot slot = kNoImageSlot;
 };
 static_assert(std::is_trivially_copyable_v<LocalizableFrame>);

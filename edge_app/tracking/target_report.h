@@ -17,7 +17,7 @@ namespace alidade {
 
 struct TargetReport {
   std::uint64_t identity = 0;
-  std::string name;  // class; empty: unknown
+  std::string name;     // class; empty: unknown
   double score = 0;     // 0 to 1, of the last detection
   double born_s = 0;    // s, host clock
   double seen_s = 0;    // s, host clock, of the last frame in which it was seen
