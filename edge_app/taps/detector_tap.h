@@ -50,8 +50,8 @@ class DetectorTap {
   [[nodiscard]] static bool takes(const OrientationRecord& record) {
     return record.mode == RecordMode::kOe && record.frame && record.time_s && record.orientation;
   }
-  // Real-time thread. record: one that takes() accepts, which is not checked again. Returns the
-  // slot of the picture that this one replaces; kNoImageSlot if it replaces none.
+  // Real-time thread. record: takes() must be true for it, which is not checked again. Returns the
+  // slot of the picture that this picture replaces; kNoImageSlot if it replaces none.
   [[nodiscard]] ImageSlot put(const OrientationRecord& record, const ImageView& image,
                               ImageSlot slot);
   // Real-time thread: no frame will follow.

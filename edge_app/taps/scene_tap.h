@@ -70,7 +70,7 @@ class SceneTap {
   // Real-time thread, for each frame: whether its image is wanted. began_anew: the first frame of a
   // connection.
   [[nodiscard]] bool wants(double now_s, RecordMode mode, bool began_anew);
-  // Real-time thread, after wants(). False: not taken.
+  // Real-time thread, after wants(). False: not taken; the slot stays the caller's.
   bool push(const LocalizableFrame& frame);
   bool pop(ToldBase& told) { return told_.pop(told); }
   // Real-time thread: no frame will follow.
