@@ -67,8 +67,8 @@ void refine_departures(const Eigen::MatrixXd& information, const Eigen::VectorXd
                        const std::vector<DeparturePart>& parts, const Eigen::MatrixXd& sure,
                        std::vector<DeparturePrior>* priors);
 
-// parts[part], which is a curve, with this amplitude and the likeliest length. It need not gain
-// evidence: gain may be negative. Absent if the curve has too few knots.
+// The prior of parts[part], which must be a curve, with this amplitude and the likeliest length. It
+// need not gain evidence: `gain` may be negative. Absent if the curve has too few knots.
 [[nodiscard]] DeparturePrior possible_curve(const Eigen::MatrixXd& information,
                                             const Eigen::VectorXd& score,
                                             const std::vector<DeparturePart>& parts,

@@ -35,7 +35,7 @@ struct MovementObservation {
   // Index of each dwell's calibration in fit_zoom(); empty: the dwell is not among them.
   std::optional<std::size_t> from;
   std::optional<std::size_t> to;
-  std::vector<double> reading;       // device units, of those that were asked for
+  std::vector<double> reading;       // device units; the asked-for readings that were observed
   Eigen::VectorXd log_focal_length;  // f in px
   Eigen::MatrixXd covariance;
   Eigen::VectorXd rate_per_s;    // d log f / dt: the effect of a time error

@@ -6,8 +6,8 @@
 //   horizon          the direction's elevation
 //   point, bearing   direction minus the sight, in its tangent basis
 //   length           distance of the two places minus the datum
-//   upright          direction of (place of the foot, height) minus the head's sight, in that one's
-//                    tangent basis
+//   upright          direction of (place of the foot, height) minus the head's sight, in the
+//                    tangent basis of the sight
 // In m or rad, as the datum.
 
 #include <Eigen/Core>

@@ -4,8 +4,8 @@
 // landmarks that were seen (landmark_filter.h, descriptors by a running average), born or dead.
 // Bounded: the sphere is divided into cells, in proportion to the landmarks' size, and each cell
 // holds a limited number of landmarks. In a full cell or map a new landmark replaces the least
-// useful one if that one is worth less. The number of candidates, which are kept beside the map, is
-// bounded too; losing them at the end does no harm.
+// useful landmark if the new one is worth more. The number of candidates, which are kept beside the
+// map, is bounded too; losing the candidates at the end does no harm.
 // Equal pictures give equal changes. Allocates; one thread at a time. Rules: docs/derivations.md.
 
 #include <cstdint>

@@ -50,11 +50,11 @@ class ArrivalPace {
     greatest_s_ = std::max(greatest_s_, receive_s - sender_s);
   }
 
-  // Judges the items up to the last one. Empty: the pace is not shown, or no longer. It is shown if
-  // the minima of receive - sender in two neighbouring halves of a window agree to the tolerance,
-  // each confirmed by a second item. (Delays only add, so minima count. A rise is a new stall, so
-  // it counts like a fall.) Halves are kLeastHalf_s and its doubles, so that one fits slow streams
-  // and delays with a rhythm (key frames).
+  // Judges the items up to the last one. Empty: the pace is not shown, or no longer. The pace is
+  // shown if the minima of receive - sender in two neighbouring halves of a window agree to the
+  // tolerance, each confirmed by a second item. (Delays only add, so minima count. A rise is a new
+  // stall, so it counts like a fall.) A half lasts kLeastHalf_s or one of its doubles, so that one
+  // of these lengths fits slow streams and delays with a rhythm (key frames).
   // least_half_s: the shortest half used. After a backlog the shortest window is not used, as the
   // rest of a backlog may come more slowly. no_backlog: something else shows that the last item did
   // not wait; the shortest window is then used.

@@ -40,8 +40,8 @@ class MinimumDelayStep {
   }
 
   // The step, if a run has lasted until this receive time and shows one. Both runs then begin anew.
-  // Call it before the item is added to a run. rate_sigma: of the line's rate (host seconds per
-  // host second); the halves may differ by it.
+  // To be called before the item is added to a run. rate_sigma: of the line's rate (host seconds
+  // per host second); the halves of a run may differ by it.
   std::optional<DelayStep> judge(double receive_s, double rate_sigma = 0) {
     const double drift_s = kReach * rate_sigma * settle_s_ / 2;
     const std::optional<DelayStep> fall = judge(&early_, true, receive_s, drift_s);

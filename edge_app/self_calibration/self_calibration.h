@@ -73,8 +73,9 @@ class SelfCalibration {
   [[nodiscard]] std::shared_ptr<const PublishedCalibration> work();
 
   [[nodiscard]] CalibrationReport report() const;
-  // Thread-safe. Asks for a calibration of the motion from now on. It replaces the present one as
-  // soon as it passes the checks of a first one. False: calibration is not automatic.
+  // Thread-safe. Asks for a new calibration, from the motion from now on. The new calibration
+  // replaces the present one as soon as it passes the checks of a first calibration. False:
+  // calibration is not automatic.
   [[nodiscard]] bool ask_for_fresh();
 
   // Thread-safe. Every work(), present or later, soon ends without a result.
@@ -117,8 +118,8 @@ class SelfCalibration {
   void store(const CalibrationResult& result, const MapState& map);
 
   // The first zoom's calibration once more, with a free optical centre. It becomes a node if
-  // another zoom follows. It is made while its motion is at hand: keeping that would take more
-  // memory than everything else here.
+  // another zoom follows. It is made while its motion is at hand: keeping the motion would take
+  // more memory than everything else here.
   struct FirstNode {
     std::string refusal;       // empty: it may become a node
     CalibrationResult result;  // only calibration, quality and exclusions are set

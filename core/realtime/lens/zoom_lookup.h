@@ -22,9 +22,9 @@ class ZoomLookup {
   // tolerance.
   [[nodiscard]] bool stands_at(double zoom, double tolerance, double time_s) const;
 
-  // The relative change of focal length between the readings around the time and the reading after
-  // them, by the curve. It shows a lens that begins to move, which stays within the tolerance at
-  // first. 0: no change, or the curve does not reach the readings.
+  // The relative change of focal length, by the curve, between the readings around the time and the
+  // reading after them. Shows a lens that begins to move, as its first readings are still within
+  // the tolerance. 0: no change, or the curve does not reach the readings.
   [[nodiscard]] double change_about(const ZoomCurve& curve, double time_s) const;
 
   // The calibration for PT mode, for a frame with this telemetry time of its middle row, whose rows
