@@ -40,9 +40,9 @@ struct KnownCameraCalibration {
   std::vector<std::string> remarks;  // what was not used, and why
 };
 
-// options: for both calibrations; the first one ignores a prior of aspect if that is wanted. In the
-// second one an accepted value replaces the prior of the same parameter. If the first calibration
-// is cancelled or finds bad input, its result is returned.
+// options: for both calibrations. If the known aspect is wanted, the first calibration ignores a
+// prior of aspect. In the second calibration an accepted value replaces the prior of the same
+// parameter. If the first calibration is cancelled or finds bad input, its result is returned.
 [[nodiscard]] KnownCameraCalibration calibrate_knowing(const CalibrationInput& input,
                                                        const CalibrationOptions& options,
                                                        const KnownCamera& known);

@@ -43,8 +43,8 @@ struct ZoomSample {
 // Subtracts common_sigma_s^2 from the variance of the clock offset: the clock error that all
 // telemetry polls share does not belong to a single calibration. Subtracts less where the
 // covariance would not stay positive. places: rows of *covariance that are not exact. clock: the
-// clock offset's row of it. Nothing happens if that row is exact or the covariance is not positive
-// definite.
+// row of *covariance for the clock offset. Nothing happens if the clock's row is exact or the
+// covariance is not positive definite.
 void take_common_clock_error(const std::vector<int>& places, int clock, double common_sigma_s,
                              Eigen::MatrixXd* covariance);
 

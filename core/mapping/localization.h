@@ -44,7 +44,7 @@ struct LocalizationOptions {
   // pose.
   double least_share = 0.25;
   double near_px = 6;  // search radius around a landmark's place by the first pose
-  // Largest distance of two descriptors of one thing; that of the most unlike ones is 512.
+  // Largest distance of two descriptors of one thing; the largest possible distance is 512.
   double most_distance = 260;
   // How far the lens may be off its curve between the zooms of the keyframes, for each unit of log
   // f from the nearest one: sigma of log f, and of the optical axis.

@@ -40,7 +40,8 @@ class CharucoLayout {
   [[nodiscard]] int images_with_markers() const { return images_with_markers_; }
   // Markers agree, but equally well in both layouts.
   [[nodiscard]] bool is_undecided() const;
-  // Another dictionary of which many markers were found, if none of this one's were.
+  // Another dictionary of which many markers were found, while no marker of the board's dictionary
+  // was. Empty: none.
   [[nodiscard]] std::optional<int> other_dictionary() const { return other_dictionary_; }
 
  private:
