@@ -5,9 +5,8 @@
 //   l_i = g(z_i) + eps(w_i) + rate_i late + noise_i        (derivation: docs/calibration.md)
 // f does not jump: eps(0) = v_A - g(z_A), eps(1) = v_B - g(z_B). Between, eps has the covariance
 // repeatability^2 (1 - |w - w'|). late (s) is one number for all movements: the reading's age
-// against the angles (zoom_fit.h) plus the clock offset's error. noise_i:
-// MovementObservation::covariance.
-// The curve gets nodes of g at each z_i and at the dwells' readings. Allocates.
+// (zoom_fit.h) plus the clock offset's error. noise_i: MovementObservation::covariance. The curve
+// gets nodes of g at each z_i and at the dwells' readings. Allocates.
 
 #include <cstddef>
 #include <vector>

@@ -6,8 +6,7 @@
 //   V(u) = 1 + falloff |u - middle|^2 / (half diagonal)^2
 // Shift and shear: errors of orientation and rates that the frames do not share, up to a pixel or
 // two where there is texture; 0 in directions without texture. V: lenses are darker at the corners,
-// and the scene moves through them while the camera turns. Moving things are outliers. No
-// allocation.
+// where the scene passes as the camera turns. Moving things are outliers. No allocation.
 
 #include <algorithm>
 #include <cstdint>

@@ -1,14 +1,12 @@
 #pragma once
-// One datum's residual, and its derivatives by the plane and by every error.
+// One datum's residual (m or rad, as the datum) and its derivatives by the plane and every error.
 //   height, place    p minus the datum
 //   heading          heading minus the datum, wrapped
 //   level, vertical  up minus the datum, in its tangent basis
 //   horizon          the direction's elevation
 //   point, bearing   direction minus the sight, in its tangent basis
 //   length           distance of the two places minus the datum
-//   upright          direction of (place of the foot, height) minus the head's sight, in the
-//                    tangent basis of the sight
-// In m or rad, as the datum.
+//   upright          direction of (foot's place, height) minus the head's sight, in its basis
 
 #include <Eigen/Core>
 #include <vector>

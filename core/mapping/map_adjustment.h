@@ -6,8 +6,7 @@
 // + |Log(Rp_i^T R_i)|^2 by cov_p, with telemetry Rp  + (eps_i / sigma_eps_i)^2 + priors of the lens
 // All pictures must be connected by landmarks, else the result names the groups. If no picture has
 // telemetry, the first picture's orientation is kept. Equal input gives equal results on one
-// thread. Allocates: the covariance takes (4 pictures + lens)^2 numbers. Method:
-// docs/derivations.md.
+// thread. Allocates (4 pictures + lens)^2 numbers of covariance. Method: docs/derivations.md.
 
 #include <Eigen/Core>
 #include <optional>

@@ -4,10 +4,9 @@
 // and the prior lens (map_adjustment.h), a second one with all features, landmarks (map_making.h).
 // Details: docs/derivations.md.
 // Pictures without telemetry are tied to the others by common features. If no picture has
-// telemetry, one picture defines the base: it looks forward. Parts of the map that are not
-// connected to the rest are named in the result. Small parts are left out; with a larger one the
-// map is refused.
-// Batch work: allocates much. Equal input gives equal maps. No threads of its own.
+// telemetry, one picture defines the base: it looks forward. Parts of the map without connection to
+// the rest are named in the result: small parts are left out, a larger one refuses the map. Batch
+// work: allocates much. Equal input gives equal maps. No threads of its own.
 
 #include <cstdint>
 #include <functional>

@@ -6,8 +6,7 @@
 //   kSymmetric  least squares with Huber weights. The window balances noise and wander of the skew:
 //               noise^2 / (item rate * window) = skew_wander^2 * window^3 / 140 (docs/clocks.md).
 // delay_stepped marks the first item with the new minimum delay; the filter's marks the item that
-// proves the step. Rejected items keep the filter's answer. No allocation: the caller lends all
-// arrays.
+// proves the step. Rejected items keep the filter's answer. The caller lends all arrays.
 
 #include <algorithm>
 #include <array>

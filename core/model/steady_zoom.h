@@ -6,8 +6,7 @@
 //               level; sigma comes from the changes and the spread. From then on readings at rest
 //               are replaced by the level, until the median of the latest five leaves it; readings
 //               of a movement pass unchanged
-// With a given tolerance jitter is not searched for: readings pass unchanged. Fixed memory; no
-// allocation.
+// With a given tolerance jitter is not searched for: readings pass unchanged. Fixed memory.
 
 #include <algorithm>
 #include <array>

@@ -6,8 +6,7 @@
 // q is R_base_from_camera. Covariance and sigma are of a perturbation R * Exp(xi), camera frame.
 // A record of a lost video has neither frame nor time_s; the record of a frame that may have waited
 // has no time_s. In mode `none` there is no orientation. If OE mode is asked for, the status `ok`
-// means mode OE.
-// Fixed size and trivially copyable: crosses the queue to the output thread by value.
+// means mode OE. Fixed size and trivially copyable, for the queue to the output thread.
 
 #include <array>
 #include <cstdint>

@@ -6,8 +6,7 @@
 // as UTC; or the local time that the device reports besides. Other devices want HTTP digest, and
 // offer it. Devices lock a user out after three to five wrong logins. Therefore at most kMostTries
 // ways are tried in one go, and no clock twice. If a login was accepted before, one attempt follows
-// each pause (HttpPollingSource), and each way gets two attempts: the device's clock may have been
-// set.
+// each pause (HttpPollingSource), two for each way: the device's clock may have been set.
 
 #include <optional>
 #include <string>

@@ -5,9 +5,8 @@
 // since the query was sent (at most kMaxAnswer; of more, the oldest are dropped) and takes the
 // latest of several answers. Anything else is skipped: noise, partial frames, echoes, late answers
 // to another query, unsolicited lines. After give_up(), next() returns a fence, a query with a
-// different answer, so that a late answer is not taken for the answer to a later query. Angles are
-// degrees as the device counts them; QuerySource applies signs and zeros. Fences:
-// docs/derivations.md.
+// different answer, so that a late answer is not taken for that of a later query. Angles are
+// degrees of the device; QuerySource applies signs and zeros. Fences: docs/derivations.md.
 
 #include <cstddef>
 #include <cstdint>

@@ -5,9 +5,8 @@
 // stamp if it is valid, else the moment of dequeueing; sequence: the driver's count
 // (v4l2_stamps.h). Luma of GREY and NV12 is the driver's buffer, without copy. The buffer goes back
 // when the frame's owner dies, even after this source; if the driver has too few buffers left, luma
-// is a copy. YUYV and UYVY: one pass extracts the luma. MJPG: libjpeg-turbo. Buffers that have an
-// error flag, are too short or cannot be decoded are skipped and counted as damaged. Statuses and
-// copies: docs/derivations.md.
+// is a copy. MJPG: libjpeg-turbo. Buffers that have an error flag, are too short or cannot be
+// decoded are skipped and counted as damaged. Statuses and copies: docs/derivations.md.
 
 #include <cstdint>
 #include <memory>

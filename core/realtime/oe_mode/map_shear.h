@@ -3,11 +3,11 @@
 // shear. The first frame's landmarks are placed with telemetry's rate; the rate's error times the
 // row's time is in their directions, and in those of all later landmarks. The angles of
 // neighbouring frames reveal this error: the derivatives in the middle of the curve through kCurve
-// angles are compared with the rate and acceleration that the map showed there, by a Kalman filter.
-// Derivation: docs/oe_mode.md.
+// angles are compared with the rate and acceleration that the map showed there, by a Kalman filter
+// (docs/oe_mode.md).
 // State of each axis: covariance of the errors of (angle, rate, acceleration) in a frame that looks
-// at tilt(), due to the shear. The angle's error counts from the map's beginning.
-// Fixed memory; no allocation. One thread.
+// at tilt(), due to the shear. The angle's error counts from the map's beginning. Fixed memory; no
+// allocation. One thread.
 
 #include <array>
 #include <cstddef>

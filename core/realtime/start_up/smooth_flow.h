@@ -6,8 +6,7 @@
 // and rolling shutter (how well the polynomial fits: docs/derivations.md). Priors proportional to
 // the motion prevent few or bunched samples from bending the polynomial. Outliers are down-weighted
 // (Geman and McClure), scaled by the median: up to a third of the image's middle may move by
-// itself.
-// The constructor takes all memory; nothing else allocates, waits or throws.
+// itself. The constructor takes all memory; nothing else allocates, waits or throws.
 
 #include <Eigen/Core>
 #include <vector>

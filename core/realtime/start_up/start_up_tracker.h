@@ -6,8 +6,7 @@
 // that of errors which differ between the observations of a landmark (docs/derivations.md). A point
 // ends if it leaves the image or is not found in two successive frames; later it is a new landmark.
 // Shifts of up to a third of the image between frames are followed; frames with nothing in common
-// end all points.
-// The constructor takes all memory; nothing else allocates, waits or throws. One thread.
+// end all points. Only the constructor allocates; nothing waits or throws after it. One thread.
 
 #include <array>
 #include <cstddef>
