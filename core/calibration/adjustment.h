@@ -1,11 +1,11 @@
 #pragma once
 // Adjustment: bundle adjustment of one calibration by Levenberg-Marquardt with the exact Jacobians
 // of linearisation.h. Landmarks are eliminated first.
-// It does not use Ceres, against which tests compare it. Ceres takes longer for the same minimum
-// (docs/measurements.md), and knots, noise and covariance need the reduced normal matrix.
+// Ceres is not used: it takes longer for the same minimum (docs/measurements.md), and knots, noise
+// and covariance need the reduced normal matrix. Tests compare both.
 // On a path that returns, landmarks tie distant times together, so the reduced matrix is dense. Up
-// to kLargestDirect rows it is solved by Cholesky, beyond by conjugate gradients
-// (reduced_equations.h), or by Cholesky if these do not converge. Allocates; one object for each
+// to kLargestDirect rows it is solved by Cholesky. A larger one is solved by conjugate gradients
+// (reduced_equations.h), and by Cholesky if these do not converge. Allocates; one object for each
 // thread.
 
 #include <Eigen/Core>
@@ -23,7 +23,7 @@ class ReducedFactor {
  public:
   // S: its lower triangle. False if it is not positive definite.
   [[nodiscard]] bool set(Eigen::MatrixXd S);
-  // K B with K^T K = S^-1.
+  // K B with K^T K = S^-1. B: as many rows as S. After set() returned true.
   [[nodiscard]] Eigen::MatrixXd half_solve(const Eigen::MatrixXd& B) const;
 
  private:
@@ -35,6 +35,8 @@ class Adjustment {
  public:
   static constexpr Eigen::Index kLargestDirect = 900;
 
+  // fixed: the parameters that are exact, by index in GlobalVector. largest_direct: rows. The data
+  // must outlive this object.
   Adjustment(const AdjustmentData& data, const AdjustmentPriors& priors,
              const std::array<bool, kGlobalCount>& fixed,
              Eigen::Index largest_direct = kLargestDirect)
@@ -55,43 +57,47 @@ class Adjustment {
   [[nodiscard]] bool solve(const Linearisation& linearisation, double damping, Eigen::VectorXd* x,
                            std::vector<Vector2<double>>* x_landmark);
 
-  // Solves H x = b, landmarks eliminated, for each column of b. *step: that for the gradient, which
-  // is what is left to go to the minimum. False if H is not positive definite.
+  // Solves H x = b, landmarks eliminated, for each column of b. *step: the solution for the
+  // gradient, that is the rest of the way to the minimum. False if H is not positive definite.
   [[nodiscard]] bool solve_columns(const Linearisation& linearisation, const Eigen::MatrixXd& b,
                                    Eigen::MatrixXd* x, Eigen::VectorXd* step);
 
   // Levenberg-Marquardt until a step promises to reduce the cost by less than `tolerance` (a change
-  // of sqrt(tolerance) standard deviations). *at: the linearisation at the final state. False if no
-  // step helps although one should, or after max_steps.
+  // of sqrt(tolerance) standard deviations). *at: the linearisation at the final state. False if
+  // the linearisation at the start is not valid, no step reduces the cost, or max_steps are used
+  // up; *state is then the best so far.
   [[nodiscard]] bool minimise(const LossScales& loss, int max_steps, double tolerance,
                               AdjustmentState* state, Linearisation* at);
 
-  // Covariance of the local parameters (zero rows where fixed), and trace(H^-1 H_telemetry), the
-  // number of unknowns that telemetry determines (Helmert). False if the data leave a direction
-  // undetermined.
+  // Covariance of the local parameters, scaled as in linearisation.h (zero rows where fixed).
+  // *telemetry_unknowns: trace(H^-1 H_telemetry), the number of unknowns that telemetry determines
+  // (Helmert). False if the data leave a direction undetermined.
   [[nodiscard]] bool covariance(const Linearisation& linearisation, GlobalMatrix* covariance,
                                 double* telemetry_unknowns);
 
-  // Of each observation, at the state of the latest covariance().
+  // The influence of each observation; zero if it is not used. state and linearisation: those of
+  // the latest covariance().
   [[nodiscard]] std::vector<Influence> influences(const AdjustmentState& state,
                                                   const Linearisation& linearisation) const {
     return lineariser_.influences(state, linearisation, global_rows_);
   }
 
-  // Of all that is in use, see Lineariser.
+  // Calls a function for each observation and each sample in use, see Lineariser.
   void visit(const AdjustmentState& state, const Linearisation& linearisation,
              const std::function<void(const ObservationRow&)>& observation,
              const std::function<void(const TelemetryRow&)>& telemetry) const {
     lineariser_.visit(state, linearisation, observation, telemetry);
   }
 
-  // Takes as long as a step of Levenberg-Marquardt by Cholesky, at any size.
+  // Factorises S. Takes as long as a step of Levenberg-Marquardt by Cholesky, at any size. False if
+  // S is not positive definite.
   [[nodiscard]] bool factorise(const Linearisation& linearisation, ReducedFactor* factor);
 
-  // The parameters' rows of H^-1, of the latest covariance(); zero where fixed.
+  // The parameters' rows of H^-1 at the latest covariance(); zero where fixed.
   [[nodiscard]] const GlobalRows& global_rows() const { return global_rows_; }
   [[nodiscard]] const std::array<bool, kGlobalCount>& fixed() const { return fixed_; }
 
+  // Of all calls of minimise(), rejected steps included.
   [[nodiscard]] int steps_taken() const { return steps_taken_; }
 
  private:

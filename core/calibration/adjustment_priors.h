@@ -1,6 +1,6 @@
 #pragma once
 // Prior knowledge in the adjustment's scaled parameters (linearisation.h): the options' priors, and
-// the drift between the clocks, which the precision of their periods bounds.
+// a prior of the drift between the clocks, from the sigmas of their periods.
 
 #include <array>
 
@@ -12,10 +12,11 @@ namespace alidade::internal {
 
 struct PriorKnowledge {
   AdjustmentPriors priors;
-  std::array<bool, kGlobalCount> fixed{};  // known exactly
+  std::array<bool, kGlobalCount> fixed{};  // known exactly; by index in GlobalVector
 };
 
-// focal_length (px): mean of the focal length if the options have no prior of it.
+// width, height: of the image, px. focal_length (px): the prior's mean if the options have no prior
+// of the focal length.
 [[nodiscard]] PriorKnowledge prior_knowledge(int width, int height,
                                              const CalibrationOptions& options,
                                              const RecordingClocks& clocks, double focal_length);

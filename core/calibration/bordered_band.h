@@ -5,8 +5,8 @@
 //   H = [ B   C^T ]   B: 2x2 blocks of control points up to kReach apart;  C, D: kBorder rows
 //       [ C    D  ]
 //
-// Only the lower triangle of B is stored. Dense, H would take 3 MB for 40 s of frames, and grow
-// with their square.
+// Only the lower triangle of B is stored. A dense H would take 3 MB for 40 s of frames, and grow
+// with the square of the time.
 
 #include <Eigen/Core>
 #include <algorithm>
@@ -29,7 +29,7 @@ class BorderedBand {
   [[nodiscard]] auto points(int row, int column) {
     return band_.block<2, 2>(2 * (row - column), 2 * column);
   }
-  // The rows of the parameters: C, then D, both triangles of it.
+  // The rows of the parameters: C, then both triangles of D.
   [[nodiscard]] Eigen::MatrixXd& border() { return border_; }
   [[nodiscard]] const Eigen::MatrixXd& border() const { return border_; }
 

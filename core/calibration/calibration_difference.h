@@ -6,7 +6,7 @@
 // Compared are focal length, radial distortion, line delay, both axes and the clock offset. Scales
 // and aspect rest on priors that both calibrations share, and are left out.
 // If both covariances are right, chi_square is chi-square distributed with as many degrees of
-// freedom as parameters are compared (99.9 % of 8 lie below 26). px, rad, s. Pure; fixed memory.
+// freedom as parameters are compared (with 8, 99.9 % lie below 26). px, rad, s. Pure; fixed memory.
 
 #include <array>
 
@@ -20,8 +20,9 @@ inline constexpr std::array<Parameter, 8> kComparedParameters = {
     Parameter::kPanAxis0,    Parameter::kPanAxis1,         Parameter::kTiltAxis0,
     Parameter::kTiltAxis1,   Parameter::kClockOffset};  // stays last
 
-// with_clock_offset: false if the frames' clock restarted between the two, so that the offsets are
-// unrelated. The chi-square then has 7 degrees of freedom.
+// with_clock_offset: false if the frames' clock restarted between the two calibrations, so that
+// their clock offsets are unrelated. The chi-square then has 7 degrees of freedom. No compared
+// parameter may be exact in both.
 [[nodiscard]] double difference_chi_square(const Calibration& a, const Calibration& b,
                                            bool with_clock_offset = true);
 

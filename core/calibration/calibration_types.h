@@ -1,6 +1,6 @@
 #pragma once
 // Input, options and result of calibrate(). Plain values. Angles rad, times s, pixels as in
-// camera.h.
+// CONVENTIONS.md.
 // Telemetry clock = image clock + clock_offset.
 
 #include <cstdint>
@@ -17,26 +17,27 @@ namespace alidade {
 
 struct CalibrationFrame {
   std::int64_t frame = 0;                // the name that observations use
-  double stamp_s = 0;                    // of row 0, jitter included
-  std::optional<std::int64_t> sequence;  // also counts lost frames
+  double stamp_s = 0;                    // image clock; of row 0, jitter included
+  std::optional<std::int64_t> sequence;  // the sender's count, which includes lost frames
 };
 
 struct CalibrationObservation {
-  std::int64_t frame = 0;
-  std::int64_t landmark = 0;
+  std::int64_t frame = 0;     // name, as in CalibrationFrame
+  std::int64_t landmark = 0;  // name; the same in all frames that see the landmark
   double u_px = 0;
   double v_px = 0;
-  double sigma_px = 0;
+  double sigma_px = 0;  // of u and of v; > 0
 };
 
 struct CalibrationTelemetry {
   double stamp_s = 0;  // telemetry clock
-  double pan_rad = 0;
+  double pan_rad = 0;  // as measured, wrapped or not
   double tilt_rad = 0;
-  std::optional<std::int64_t> sequence;
+  std::optional<std::int64_t> sequence;  // the sender's count, which includes lost samples
 };
 
-// Values that are not given are estimated from the data.
+// Standard deviations of the noise, and the periods of the streams' clocks. A value that is not
+// given is estimated from the data.
 struct CalibrationNoise {
   std::optional<double> image_stamp_sigma_s;
   std::optional<double> image_period_s;
@@ -45,8 +46,8 @@ struct CalibrationNoise {
   std::optional<double> telemetry_period_s;
   std::optional<double> telemetry_period_sigma_s;
   std::optional<double> pan_tilt_sigma_rad;
-  // s; of an error that all telemetry stamps share, in addition to the above. Averaging over
-  // samples does not reduce its effect on the clock offset.
+  // Standard deviation of an error that all telemetry stamps share, in addition to each stamp's
+  // own. Averaging over samples does not reduce its effect on the clock offset.
   double telemetry_common_sigma_s = 0;
 };
 
@@ -59,7 +60,7 @@ struct CalibrationInput {
   CalibrationNoise noise;
 };
 
-// sigma 0: known exactly.
+// In the unit of its parameter. sigma 0: known exactly.
 struct CalibrationPrior {
   double value = 0;
   double sigma = 0;
@@ -75,9 +76,9 @@ enum class StampNoise {
 struct CalibrationOptions {
   std::optional<CalibrationPrior> focal_length;  // px
   std::optional<CalibrationPrior> aspect = CalibrationPrior{1, 0};
-  std::optional<CalibrationPrior> radial_distortion;
+  std::optional<CalibrationPrior> radial_distortion;  // k, no unit
   // Offset of the optical centre from the image's middle. At one zoom it can hardly be
-  // distinguished from a turn of the axes, so the sigmas of both include that.
+  // distinguished from a turn of the axes: the sigmas of centre and axes include this doubt.
   Vector2<double> centre_offset_px = Vector2<double>::Zero();
   double centre_sigma_px = 0;                    // each component; 0: known exactly
   std::optional<CalibrationPrior> line_delay;    // s/row
@@ -86,9 +87,9 @@ struct CalibrationOptions {
   CalibrationPrior tilt_scale = {1, 1e-8};
   Vector3<double> pan_axis = Vector3<double>::UnitZ();
   Vector3<double> tilt_axis = Vector3<double>::UnitY();
-  double axis_sigma_rad = 0.05;  // each tangent component
-  // The accuracy that the maker claims for the angles of either axis: one standard deviation, rad,
-  // of errors that vary slowly over the whole visited range. The recording cannot show them, as
+  double axis_sigma_rad = 0.05;  // of both axes, each tangent component
+  // The accuracy that the maker claims for the angles of either axis: one standard deviation of
+  // errors that vary slowly over the whole visited range. The recording cannot show such errors, as
   // they look like a scale. 0: no claim; the priors of the scales hold as they are.
   double angle_accuracy_rad = 0;
 
@@ -96,7 +97,7 @@ struct CalibrationOptions {
   StampNoise telemetry_stamps = StampNoise::kSymmetric;
   // Half the range that is searched first. It is widened while the best offset is at its edge.
   double clock_offset_search_s = 1;
-  double first_knot_spacing_s = 0.5;
+  double first_knot_spacing_s = 0.5;  // of the trajectory, before the residuals ask for more knots
   int max_knots = 2000;
 
   // Called between steps with the progress (0 to 1) and a few words. Returning false cancels.
@@ -105,7 +106,7 @@ struct CalibrationOptions {
   // False and one line in *error (if not null) when a value is out of its range.
   [[nodiscard]] bool validate(std::string* error = nullptr) const;
 
-  // Prior standard deviation of a parameter. 0: known exactly. Nothing: no prior.
+  // Prior standard deviation of a parameter, in its unit. 0: known exactly. Empty: no prior.
   [[nodiscard]] std::optional<double> prior_sigma(Parameter parameter) const;
 };
 
@@ -130,8 +131,8 @@ struct StreamTiming {
   double period_s = 0;
   double period_sigma_s = 0;
   double offset_sigma_s = 0;  // of the line at its middle
-  double stamp_sigma_s = 0;
-  int lost = 0;  // gaps in the sequence
+  double stamp_sigma_s = 0;   // of one stamp about the line
+  int lost = 0;               // ticks of the clock that have no stamp
 };
 
 // Counts of what was left out, by reason.
@@ -157,8 +158,8 @@ struct CalibrationExclusions {
 };
 
 struct CalibrationLandmark {
-  std::int64_t landmark = 0;
-  Vector3<double> d_b;
+  std::int64_t landmark = 0;  // name, as in CalibrationObservation
+  Vector3<double> d_b;        // unit direction
   // rad^2, in tangent_basis(d_b). From the landmark's own observations, with camera and trajectory
   // taken as known.
   Matrix2<double> covariance = Matrix2<double>::Zero();
@@ -168,8 +169,8 @@ struct CalibrationLandmark {
 struct FrameResult {
   std::int64_t frame = 0;
   double time_s = 0;      // image clock, row 0
-  PanTilt<double> angle;  // true angles at that time
-  PanTilt<double> rate;
+  PanTilt<double> angle;  // true angles at that time, rad
+  PanTilt<double> rate;   // rad/s
 };
 
 // Seen minus projected (A^-1 e of linearisation.h). Its standard deviation is the observation's
@@ -179,9 +180,9 @@ struct ObservationResidual {
   Vector2<double> error_px;
   bool outlier = false;
 };
-// Telemetry with a coarse angle resolution gives one more item for each change of a reading. It
-// lies at the middle of the two samples' times, when the angle passed half-way between the
-// readings. It has NaN for an axis that did not change.
+// Telemetry with a coarse angle resolution gives one more item for each change of a reading. Its
+// time is the middle of the two samples' times, when the angle passed half-way between the
+// readings. Its error is NaN for an axis that did not change.
 struct TelemetryResidual {
   std::size_t sample = 0;  // index into the input
   double time_s = 0;       // image clock
@@ -190,8 +191,8 @@ struct TelemetryResidual {
   bool outlier = false;
 };
 
-// Parts of the recording disagree in a parameter by more than chance. Its sigma has grown
-// accordingly.
+// Parts of the recording disagree in a parameter by more than chance. The parameter's sigma has
+// grown accordingly.
 struct CalibrationContradiction {
   std::string parameter;
   std::string between;  // which parts: "stretches of time"
@@ -203,29 +204,29 @@ struct CalibrationContradiction {
 struct CalibrationCause {
   std::string cause;  // "play of pan"
   double chi_square = 0;
-  double freedom = 0;
-  double size = 0;  // of the departure, root mean square, in `unit`
+  double freedom = 0;  // of chi_square
+  double size = 0;     // of the departure, root mean square, in `unit`
   std::string unit;
 };
 
 struct CalibrationQuality {
-  double pixel_sigma_ratio = 0;      // residual / stated noise, redundancy accounted for
+  double pixel_sigma_ratio = 0;      // RMS of residual / stated noise, redundancy accounted for
   double telemetry_sigma_ratio = 0;  // likewise
   // How many observations of a landmark in neighbouring frames count as one independent
   // observation, as their errors are correlated. 1: independent. The sigmas account for it.
   double repetition = 1;
   double mean_reprojection_error_px = 0;
-  int frames = 0;
+  int frames = 0;  // here and below: counts of what was used
   int observations = 0;
   int landmarks = 0;
-  int telemetry = 0;
-  int steps = 0;
+  int telemetry = 0;              // samples
+  int steps = 0;                  // of the adjustment
   double motion_correlation = 0;  // of image motion and telemetry, at the start
   // Largest over smallest eigenvalue of the parameters' correlation matrix, and the eigenvector of
   // the largest one in words.
   double condition = 0;
   std::string weakest_direction;
-  // Clock offset or read-out time is among what is too uncertain. Changes of speed would help.
+  // Clock offset or read-out time is too uncertain. Changes of speed would help.
   bool weak_in_time = false;
   std::vector<std::string> advice;  // what motion or knowledge would help; also with kOk
   std::optional<CalibrationContradiction> contradiction;  // the worst

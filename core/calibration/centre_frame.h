@@ -1,11 +1,11 @@
 #pragma once
-// The camera frame of a calibration of one zoom, whose optical centre was free. Its axis goes
-// through the centre's estimate where the data show that the centre is not the prior's, else
-// through that of the prior; by definition, as the base is where the camera looks at zero pan and
-// tilt. So the centre is exact then, and what its error does to the other parameters is in their
-// covariance:
+// The camera frame of a calibration at one zoom whose optical centre was free. The frame's z axis
+// goes through the centre's estimate if the data show that the centre is not the prior's, else
+// through the prior's centre. This is a definition: the base is where the camera looks at zero pan
+// and tilt. The centre becomes exact, and what its error does to the other parameters becomes part
+// of their covariance:
 //   C' = C_held + (S - G) V (S - G)^T        C_held, S, V: centre_share.h
-// G is the turn of the axes with camera frame and base, c / f for c px, which is no error of any
+// G: an error of c px turns camera frame, base and axes together by c / f, which is no error of any
 // direction. Pure; no allocation. Derivation: docs/calibration.md.
 
 #include "core/calibration/centre_share.h"
@@ -14,7 +14,8 @@
 
 namespace alidade {
 
-// d axes (local, as Parameter) / d centre (px), of the same camera with another axis.
+// G: d axes (rad, local as in Parameter) / d centre (px), of one camera whose frame is defined by
+// another axis. The other rows are zero.
 [[nodiscard]] inline Matrix<double, kParameterCount, 2> axes_by_centre(const Calibration& c) {
   // The camera frame's turn that takes its axis to a centre to the right, or below.
   Matrix<double, 3, 2> turn = Matrix<double, 3, 2>::Zero();
@@ -32,7 +33,8 @@ namespace alidade {
 
 namespace internal {
 
-// The share of the centre in covariances that are told with it as exact.
+// (S - G) and V: the centre's share in the covariance of a calibration that states the centre as
+// exact. free: the calibration with a free centre.
 [[nodiscard]] inline CentreShare<kParameterCount> share_in_frame(const Calibration& free) {
   CentreShare<kParameterCount> share = centre_share<kParameterCount>(free.covariance);
   if (!share.exists()) return share;
@@ -43,8 +45,9 @@ namespace internal {
 
 }  // namespace internal
 
-// Whether the data say more of the centre than the prior, and chance would move it as far from the
-// prior's in one of a thousand recordings only. prior_sigma: px, of either component.
+// Whether the data say more of the centre than the prior does, and chance would move the estimate
+// so far from the prior's centre in one of a thousand recordings only. prior: offset from the
+// image's middle, px. prior_sigma: px, of either component; 0: never.
 [[nodiscard]] inline bool centre_is_shown(const Calibration& free, const Vector2<double>& prior,
                                           double prior_sigma) {
   constexpr double kLimit = 13.8;  // of chi-square with 2 degrees of freedom
@@ -59,6 +62,7 @@ namespace internal {
   return weighted.dot(of_data.inverse() * weighted) > kLimit;
 }
 
+// The frame's axis goes through the centre's estimate. For a centre that is shown.
 [[nodiscard]] inline Calibration with_frame_through_centre(const Calibration& free) {
   Calibration out = free;
   out.covariance = internal::with_centre_held(
@@ -67,8 +71,8 @@ namespace internal {
   return out;
 }
 
-// exact: from the same data, with the prior's centre as exact. It lacks what the centre's error
-// does.
+// The frame's axis goes through the prior's centre. exact: from the same data as `free`, with the
+// prior's centre as exact; its covariance lacks the effect of the centre's error, which is added.
 [[nodiscard]] inline Calibration with_centre_error(const Calibration& exact,
                                                    const Calibration& free) {
   internal::CentreShare<kParameterCount> share = internal::share_in_frame(free);

@@ -1,11 +1,12 @@
 #pragma once
-// CentreShare: what of a covariance C the optical centre brings, apart from the rest:
+// CentreShare: the part of a covariance C that the optical centre's error makes:
 //   C = C_held + S V S^T,   S = C_xc V^-1,   V = C_cc      c the centre, x all parameters
-// C_held is the covariance with the centre known exactly; S how the parameters follow the centre.
-// At a long focal length c px of it turn the axes by c / f, to well within 1e-3 of that: C is
-// nearly singular, C_held is not. So what enlarges a covariance does so in C_held. Units: px, and
-// those of the parameters, which begin with camera_column's. Pure; no allocation. Derivation:
-// docs/calibration.md.
+// C_held is the covariance with the centre known exactly. S says how the parameters follow the
+// centre. At a long focal length an error of the centre by c px looks like a turn of the axes by
+// c / f, to well within 1e-3 of c / f: C is nearly singular, C_held is not. A factor that enlarges
+// a covariance must therefore be applied to C_held, not to C.
+// Rows of C: the parameters, in their units; camera_column's come first, the centre in px. Pure; no
+// allocation. Derivation: docs/calibration.md.
 
 #include <Eigen/LU>
 #include <algorithm>
@@ -22,9 +23,11 @@ struct CentreShare {
   Matrix2<double> covariance = Matrix2<double>::Zero();       // V, px^2
 
   [[nodiscard]] bool exists() const { return covariance.diagonal().minCoeff() > 0; }
+  // S V S^T.
   [[nodiscard]] Matrix<double, n, n> part() const { return slope * covariance * slope.transpose(); }
 };
 
+// Does not exist if the centre is exact, or V is not positive definite.
 template <int n>
 [[nodiscard]] CentreShare<n> centre_share(const Matrix<double, n, n>& covariance) {
   constexpr int c = camera_column::kCentreU;
@@ -37,7 +40,8 @@ template <int n>
   return share;
 }
 
-// C_held. Rows and columns of the centre are zero; no variance is negative.
+// C_held; C itself if the share does not exist. Rows and columns of the centre are zero; no
+// variance is negative.
 template <int n>
 [[nodiscard]] Matrix<double, n, n> with_centre_held(const Matrix<double, n, n>& covariance,
                                                     const CentreShare<n>& share) {
@@ -50,8 +54,9 @@ template <int n>
   return held;
 }
 
-// V if what the data say of the centre is worth 1 / growth of it. prior_sigma: px, of either
-// component; what it says stays.
+// V after the data's information on the centre is divided by `growth` (less than 1 counts as 1).
+// The prior's information stays. prior_sigma: px, > 0, of either component; V, which includes this
+// prior, is smaller than prior_sigma^2.
 [[nodiscard]] inline Matrix2<double> grown_centre(const Matrix2<double>& V, double prior_sigma,
                                                   double growth) {
   const double prior = 1 / (prior_sigma * prior_sigma);

@@ -1,8 +1,8 @@
 #pragma once
 // Do parts of a recording contradict each other, and by how much must the sigmas then grow? Parts
-// are blocks of time, cells of an axis's angle, or runs between two reversals of an axis. Each is
-// longer than errors of neighbouring frames are correlated. What the model leaves out and the
-// trajectory does not absorb moves the parameters part by part:
+// are blocks of time, cells of an axis's angle, or runs between two reversals of an axis. Each part
+// is longer than the errors of neighbouring frames are correlated. What the model leaves out and
+// the trajectory does not absorb moves the parameters part by part:
 //   z_c = sum of F_i e_i over the rows of part c           F_i influence, e_i residual
 //   growth of parameter p = sum_c z_c,p^2 / sum_c V_c,pp   V_c: variance of z_c with white errors
 // A growth that chance explains is left out. Derivation: docs/calibration.md. Allocates.
@@ -26,14 +26,14 @@ struct Division {
 struct PartGrowth {
   double ratio = 1;    // growth of the variance, as above
   double freedom = 0;  // number of independent parts; 0: nothing is known
-  double share = 0;    // of the variance that the rows decide; the rest is the prior's
+  double share = 0;    // 0 to 1: part of the variance that the rows decide; the prior has the rest
 };
 
 // The most improbable disagreement. scatter: of the parts' values, over the scatter that their
 // noise explains.
 struct Contradiction {
-  int parameter = -1;  // index in GlobalVector; -1: chance explains all
-  std::string between;
+  int parameter = -1;   // index in GlobalVector; -1: chance explains all
+  std::string between;  // name of the division
   double scatter = 1;
 };
 

@@ -3,8 +3,9 @@
 // not have. To first order the truth adds X theta to the errors e, X some columns for each row.
 //   score s = X^T e,   information N = X^T X - X^T J H^-1 J^T X
 // Trajectory, landmarks and parameters are eliminated: what they absorb does not count. The best
-// theta is N^-1 s, and s^T N^-1 s is chi-square if theta is 0. Left out, it moves the parameters by
-// effect theta. Derivation: docs/calibration.md. Allocates.
+// theta is N^-1 s, and s^T N^-1 s is chi-square if theta is 0. A theta that is left out moves the
+// parameters by effect theta. e has the unit of its sigma, theta that of the caller's columns.
+// Derivation: docs/calibration.md. Allocates.
 
 #include <Eigen/Core>
 #include <vector>
@@ -19,15 +20,15 @@ using DepartureEffect = Eigen::Matrix<double, kGlobalCount, Eigen::Dynamic>;
 
 class DepartureScore {
  public:
-  // at: the minimum of least squares, which must outlive this object.
+  // columns: the size of theta. at: the minimum of least squares, which must outlive this object.
   DepartureScore(int columns, const Linearisation& at);
 
-  // X: the row's columns first, first + 1, ...; those it does not name are zero. Once for each row.
+  // X: the row's columns first, first + 1, ...; its other columns are zero. Once for each row.
   void add(const ObservationRow& row, int first, const DepartureColumns& X);
   void add(const TelemetryRow& row, int first, const DepartureColumns& X);
 
-  // After the last row: eliminates, of all scores of one minimum together. adjustment: its latest
-  // covariance() was of this minimum.
+  // After the last row, before the results below: eliminates for all scores of one minimum
+  // together. factor: of this minimum. adjustment: its latest covariance() was of this minimum.
   static void finish(const ReducedFactor& factor, const Adjustment& adjustment,
                      std::vector<DepartureScore>* scores);
 
@@ -35,6 +36,7 @@ class DepartureScore {
   [[nodiscard]] const Eigen::MatrixXd& information() const { return information_; }
   // The information if trajectory, landmarks and parameters were known.
   [[nodiscard]] const Eigen::MatrixXd& full_information() const { return full_; }
+  // d parameters / d theta, parameters scaled as in linearisation.h.
   [[nodiscard]] const DepartureEffect& effect() const { return effect_; }
 
  private:

@@ -5,8 +5,9 @@
 //               (one axis late)
 //   pictures    focal length that drifts, r^5 distortion, optical centre, lag at speed,
 //               parallax (a pupil off the axes, and depth), part of the scene that drifts
-// The most improbable cause comes first, then what is improbable beside it. False alarms: 1 % for
-// all causes together. Derivation: docs/calibration.md. Allocates.
+// The most improbable cause comes first. The next one is the most improbable with the first one's
+// unknowns free, and so on. False alarms: 1 % for all causes together. Allocates.
+// Derivation: docs/calibration.md.
 
 #include <vector>
 
@@ -20,6 +21,7 @@ struct Departures {
   GlobalMatrix error = GlobalMatrix::Zero();  // to add to the parameters' covariance
 };
 
+// state, at, factor: the minimum of least squares, of which adjustment has the covariance.
 [[nodiscard]] Departures find_departures(const Adjustment& adjustment, const AdjustmentState& state,
                                          const Linearisation& at, const ReducedFactor& factor);
 

@@ -1,24 +1,27 @@
 #pragma once
-// depth_spread(): do landmarks lie at different distances, seen by a pupil before or behind the
-// axes? Then each landmark moves through the picture as if it had its own focal length:
-//   its image moves by a share rho o of its distance from the middle   rho 1/distance, o pupil (m)
-// Landmarks have other errors of their own, too. So errors along the radius are compared with those
-// across it, which no depth explains. The trajectory follows what neighbours have in common, so
-// that is looked for by itself, over the scene. What all rho o have in common is a focal length and
-// shows nowhere. With fewer than 20 landmarks that move, nothing is known.
-// Derivation: docs/calibration.md. Allocates.
+// depth_spread(): do landmarks lie at different depths, seen by a pupil before or behind the axes?
+// Then each landmark moves through the picture as if the focal length were 1 + rho o times as long:
+//   rho   1 / depth of the landmark, 1/m        o   from the axes to the pupil, m, forward positive
+// Landmarks have other errors of their own. So the errors along the radius from the picture's
+// middle are compared with those across it, which no depth explains. What neighbouring landmarks
+// have in common the trajectory absorbs; it is estimated separately, on a grid over the scene. The
+// mean of all rho o is part of the focal length and does not show. Allocates.
+// Derivation: docs/calibration.md.
 
 #include "core/calibration/adjustment.h"
 
 namespace alidade::internal {
 
+// With fewer than 20 landmarks that moved through the picture, all but `landmarks` is 0.
 struct DepthSpread {
-  double log_chance = 0;  // natural; of such an excess along the radius; 0: nothing is known
-  double excess = 0;      // of the chi-square along the radius over that across it
-  double landmarks = 0;   // number that moved through the picture
-  double sigma = 0;       // of rho o, of landmarks by themselves and over the scene together
+  // Natural logarithm of the chance of so large an excess without depth. 0: nothing is known.
+  double log_chance = 0;
+  double excess = 0;     // chi-square along the radius minus that across it, at least 0
+  double landmarks = 0;  // count of those that moved through the picture
+  double sigma = 0;      // standard deviation of rho o (no unit), separate and over the scene
 };
 
+// state, at, factor: the minimum of least squares.
 [[nodiscard]] DepthSpread depth_spread(const Adjustment& adjustment, const AdjustmentState& state,
                                        const Linearisation& at, const ReducedFactor& factor);
 

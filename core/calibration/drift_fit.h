@@ -1,10 +1,10 @@
 #pragma once
-// DriftFit: the adjustment, linearised once, with a drift for chosen landmarks: turned back by
-// (pan, tilt) rates w, the landmark is at rest,
+// DriftFit: the adjustment, linearised once, in which chosen landmarks l drift at a constant rate
+// w_l of (pan, tilt) about their mean time t_l:
 //   error = J_angle p(t) + J_camera g + J_landmark d_l + J_angle w_l (t - t_l) + noise.
-// Trajectory, parameters and landmarks are solved for; telemetry and priors count as ever, so that
-// drifts are against telemetry. Observations that fit no drift count less, as in telemetry_fit.h.
-// Rates in rad/s. Allocates.
+// Trajectory p, parameters g, landmarks d_l and rates are solved for. Telemetry and priors count as
+// in the adjustment: a drift is against telemetry. Observations that fit no drift count less, as in
+// telemetry_fit.h. Times s on the image clock, rates rad/s. Allocates.
 
 #include <Eigen/Core>
 #include <array>
@@ -17,26 +17,28 @@ namespace alidade::internal {
 
 class DriftFit {
  public:
-  // Of one landmark, given all that landmarks share.
+  // One landmark. Its rate and equations hold for given trajectory and parameters.
   struct Track {
     double begin_s = 0;
     double middle_s = 0;  // mean time
     double end_s = 0;
-    int observations = 0;
-    Vector2<double> rate = Vector2<double>::Zero();
-    Matrix2<double> covariance = Matrix2<double>::Zero();  // of its own noise
+    int observations = 0;                                  // 0: none is in use
+    Vector2<double> rate = Vector2<double>::Zero();        // of (pan, tilt)
+    Matrix2<double> covariance = Matrix2<double>::Zero();  // of the rate, by the track's own noise
     Vector4<double> gradient = Vector4<double>::Zero();    // of (d_l, w_l), in `normal`'s terms
     Matrix4<double> normal = Matrix4<double>::Zero();
     std::vector<int> points;  // control points
     Eigen::MatrixXd cross;    // rows: points, then camera
   };
 
-  // Of all observations, whatever their marks, which stay; of at most some ten thousand, evenly
-  // over the frames.
+  // Uses outliers, too; the marks of the data stay. Of more than some ten thousand observations,
+  // only those of every second frame, or third, and so on, are used. state: near the minimum.
+  // Borrows nothing after the call.
   DriftFit(AdjustmentData* data, const AdjustmentState& state, Adjustment* adjustment);
 
-  // Solves with drifts for landmarks that are not at rest, and sets each track's rate. Returns the
-  // sum of squares at the minimum, less that of zero unknowns; nothing if it has no minimum.
+  // Solves with a drift for each landmark that is not at rest, and sets each track's rate. at_rest:
+  // by landmark, 0 or 1. *cost: the sum of squares at the minimum minus that of zero unknowns.
+  // False: there is no minimum.
   [[nodiscard]] bool solve(const std::vector<char>& at_rest, double* cost);
 
   [[nodiscard]] const std::vector<Track>& tracks() const { return tracks_; }  // by landmark

@@ -1,10 +1,10 @@
 #pragma once
 // What moves in the picture: tracks of clouds, waves or traffic that drift against telemetry, told
-// from the ground before anything is adjusted. The ground is what is at rest, be it the minority:
-// tracks that were seen at the same times fall into groups of one rate each; of the groups that can
-// be at rest together, telemetry fits one (drift_fit.h), by its sum of squares. Groups that differ
-// by what departures from the model do (parallax, gears) drift this way and that: only what keeps
-// its rate is a drift. Rates in rad/s. Allocates.
+// from the ground before anything is adjusted. Tracks of the same time fall into groups, each of
+// one rate. Telemetry fits best if the group of the ground is taken to be at rest (drift_fit.h, sum
+// of squares), even if it is the smaller one. Departures from the model (parallax, gears) make
+// groups, too, but such a group changes its rate: only a group that keeps its rate drifts. Rates in
+// rad/s. Allocates.
 
 #include <optional>
 #include <vector>
@@ -23,14 +23,14 @@ enum class DriftFinding {
 
 struct DriftingTracks {
   DriftFinding finding = DriftFinding::kNone;
-  std::vector<char> drifts;  // by landmark
-  int count = 0;
+  std::vector<char> drifts;                        // by landmark; 1: drifts
+  int count = 0;                                   // of landmarks that drift
   Vector2<double> rate = Vector2<double>::Zero();  // of the group, (pan, tilt)
 };
 
-// state: near the minimum. resolution_rad: telemetry's steps, within which all may seem to drift;
-// 0: none. Takes some solutions of the adjustment's size; longer recordings than some minutes are
-// not looked at. The data's marks stay.
+// state: near the minimum. resolution_rad: the step of telemetry's angles, within which everything
+// may seem to drift; 0: no steps. Takes some solutions of the adjustment's size. A recording of
+// more than some minutes is not examined: kNone. The data's marks stay.
 [[nodiscard]] DriftingTracks find_drifting_tracks(AdjustmentData* data,
                                                   const AdjustmentState& state,
                                                   double resolution_rad, Adjustment* adjustment);

@@ -1,6 +1,6 @@
 #pragma once
-// EstimateReader: what files of estimates (calibration.yaml, lens.yaml) have in common, read
-// strictly (strict_yaml.h):
+// EstimateReader: reads strictly (strict_yaml.h) what all files of estimates (calibration.yaml,
+// lens.yaml) have:
 //   format: 1
 //   image: {width: 1920, height: 1080}
 //   NAME: {value: ..., sigma: ...}
@@ -15,34 +15,34 @@
 
 namespace alidade {
 
-// Plausible values in the right unit. A value outside is probably in another unit.
+// Plausible values in the right unit. A value outside of them is probably in another unit.
 struct EstimateRange {
   double least;
   double most;
   const char* hint;  // completes "give ..."
 };
 
-// The rows of a covariance: names, the largest sigma of each, and the texts for an unknown name and
-// for the unit.
+// The rows of a covariance, and texts for errors.
 struct EstimateRows {
   std::vector<std::string> names;
-  std::vector<double> largest_sigma;
-  std::string known;
-  std::string unit;
+  std::vector<double> largest_sigma;  // as long as names; in the row's unit
+  std::string known;                  // says which names are known
+  std::string unit;                   // says which unit a sigma has
 };
 
 class EstimateReader {
  public:
+  // file: its name in errors.
   EstimateReader(const YAML::Node& root, std::string file);
 
   [[noreturn]] void fail(const YAML::Node& node, const std::string& text) const;
   [[nodiscard]] const YAML::Node& root() const { return root_; }
 
-  // kind completes "not ...". known: the keys allowed at the top.
+  // Requires the format's number. kind completes "not ...". known: the keys allowed at the top.
   void check_top(const std::string& kind, const std::vector<std::string>& known) const;
+  // prefix, here and below: the path of the map, with a dot at its end.
   void check_keys(const YAML::Node& map, const std::vector<std::string>& known,
                   const std::string& prefix) const;
-  // prefix: the path of the map, with a dot at its end.
   [[nodiscard]] YAML::Node required(const YAML::Node& map, const char* key,
                                     const std::string& prefix) const;
   [[nodiscard]] double number(const YAML::Node& node, const std::string& name) const;
@@ -52,15 +52,16 @@ class EstimateReader {
   void read_image(int* width, int* height) const;
   // The map {value, sigma} of this name.
   [[nodiscard]] YAML::Node entry(const std::string& name) const;
-  // Its value, checked against the range.
+  // The value of an entry, checked against the range.
   [[nodiscard]] double value(const YAML::Node& entry, const std::string& name,
                              const EstimateRange& range) const;
 
-  // Fills the rows that the file names; the others keep their values. Requires a symmetric,
-  // positive semidefinite matrix and no sigma beyond its largest.
+  // Fills the rows and columns that the file names; the others keep their values. covariance: as
+  // many rows as `rows`. Requires a symmetric, positive semidefinite matrix and no sigma above its
+  // largest_sigma.
   void read_covariance(const YAML::Node& entry, const EstimateRows& rows,
                        Eigen::Ref<Eigen::MatrixXd> covariance) const;
-  // Checks sigma against the covariance of the same file.
+  // Checks that sigma agrees with the variance in the covariance of the same file.
   void check_sigma(const YAML::Node& node, const std::string& name, double sigma,
                    double variance) const;
 

@@ -9,8 +9,8 @@
 
 namespace alidade {
 
-double held_out_error(const std::vector<CalibrationObservation>& held_out,
-                      const FrameTimes& time_of, const CalibrationResult& result) {
+std::optional<double> held_out_error(const std::vector<CalibrationObservation>& held_out,
+                                     const FrameTimes& time_of, const CalibrationResult& result) {
   std::unordered_map<std::int64_t, const CalibrationLandmark*> landmark_of;
   for (const CalibrationLandmark& landmark : result.landmarks)
     landmark_of[landmark.landmark] = &landmark;
@@ -37,7 +37,7 @@ double held_out_error(const std::vector<CalibrationObservation>& held_out,
     const Vector2<double> residual = Vector2<double>(seen.u_px, seen.v_px) - u;
     squares.push_back(residual.dot(covariance.inverse() * residual));
   }
-  if (squares.empty()) return 0;
+  if (squares.empty()) return std::nullopt;
   const auto middle = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
   std::nth_element(squares.begin(), middle, squares.end());
   return std::sqrt(*middle / (2 * std::log(2.0)));

@@ -3,11 +3,12 @@
 //   r = seen - projected          with camera, trajectory and landmarks (rolling_shutter.h)
 //   C = sigma_px^2 I + J_u_d cov_d J_u_d^T                     covariance of r
 //   result = sqrt(median(r^T C^-1 r) / (2 ln 2))               1 if all sigmas are right
-// r^T C^-1 r is then a chi-square of 2 degrees of freedom, half of which lie below 2 ln 2. The
-// median is robust, as outliers say nothing about the calibration.
+// With right sigmas r^T C^-1 r is a chi-square of 2 degrees of freedom; its median is 2 ln 2. The
+// median is robust: outliers say nothing about the calibration.
 // px, rad, s on the image clock. Pure; allocates.
 
 #include <cstdint>
+#include <optional>
 #include <unordered_map>
 #include <vector>
 
@@ -15,11 +16,13 @@
 
 namespace alidade {
 
-// Capture time of row 0 by frame name; s on the image clock.
+// By CalibrationFrame::frame: the time at which row 0 was exposed; s on the image clock.
 using FrameTimes = std::unordered_map<std::int64_t, double>;
 
-// 0 if no observation has a frame with a time, a landmark of the result, and a projection.
-[[nodiscard]] double held_out_error(const std::vector<CalibrationObservation>& held_out,
-                                    const FrameTimes& time_of, const CalibrationResult& result);
+// Empty if nothing could be compared: an observation needs a frame with a time, a landmark of the
+// result, and a projection.
+[[nodiscard]] std::optional<double> held_out_error(
+    const std::vector<CalibrationObservation>& held_out, const FrameTimes& time_of,
+    const CalibrationResult& result);
 
 }  // namespace alidade

@@ -3,8 +3,9 @@
 //   frames         finite stamp, each name once; ordered by sequence number if all have one, else
 //                  by stamp
 //   telemetry      finite, each number (or stamp) once; ordered likewise
-//   observations   finite, sigma > 0, in the image (1 px of margin), in a used frame, of a landmark
-//                  seen once there and in two frames or more; ordered by landmark, then frame
+//   observations   finite, sigma > 0, in the image or up to 1 px outside of it, in a used frame
+//                  that shows its landmark once, of a landmark in two frames or more; ordered by
+//                  landmark, then frame
 // Refuses too little of any, and other units: degrees, normalised coordinates. Allocates.
 
 #include <cstddef>
@@ -28,8 +29,8 @@ struct SelectedInput {
   std::vector<std::int64_t> landmark_name;     // for each landmark of data.observations
 };
 
-// Fills the indices, the names and data.observations. fit_clocks() sets the times
-// (recording_clocks.h). What is left out is counted in *excluded.
+// Fills the indices, the names and data.observations. The times are set later, by fit_clocks()
+// (recording_clocks.h). *excluded counts what is left out.
 [[nodiscard]] StageStatus select_input(const CalibrationInput& input, SelectedInput* selected,
                                        CalibrationExclusions* excluded);
 

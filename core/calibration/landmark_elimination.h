@@ -1,7 +1,7 @@
 #pragma once
-// Eliminates the landmarks from the normal equations H x = g: each direction is the best one for x.
-// What remains is S = H - Y Y^T and g - Y y, with Y = H_touched L^-T, y = L^-1 g_landmark, L L^T =
-// H_landmark. Y has two columns for each landmark.
+// Eliminates the landmarks from the normal equations H x = g: given x, each landmark's direction is
+// the best one. What remains is S = H - Y Y^T and g - Y y, with Y = H_touched L^-T,
+// y = L^-1 g_landmark, L L^T = H_landmark. Y has two columns for each landmark.
 
 #include <Eigen/Cholesky>
 #include <cstddef>
@@ -13,7 +13,8 @@ namespace alidade::internal {
 
 using CameraRows = Eigen::Matrix<double, kObservedCount, 2>;
 
-// A landmark's columns of Y, and its y (gradient). Control points as in Linearisation::touched.
+// The columns of Y that belong to one landmark, and its part of y (gradient). points: the control
+// points in Linearisation::touched, in its order.
 struct EliminatedLandmark {
   std::size_t landmark = 0;
   std::vector<Matrix2<double>> points;
@@ -21,8 +22,9 @@ struct EliminatedLandmark {
   Vector2<double> gradient;
 };
 
-// Calls use(EliminatedLandmark) for each observed landmark, with the diagonal of H multiplied by 1
-// + damping. False if the block of one is not positive definite.
+// Calls use(const EliminatedLandmark&) for each observed landmark; the argument is valid during the
+// call. The diagonal of each landmark's block is multiplied by 1 + damping. False if a landmark's
+// block is not positive definite.
 template <class Use>
 [[nodiscard]] bool eliminate_landmarks(const Linearisation& in, double damping, Use use) {
   EliminatedLandmark out;

@@ -1,11 +1,11 @@
 #pragma once
-// The sum of squares that a calibration minimises, linearised: over the parameters, the trajectory
-// and the landmarks
+// The sum of squares that a calibration minimises over the parameters, the trajectory and the
+// landmarks, linearised:
 //   sum rho(|A^-1 (u - pi(R(p(t + v l))^T d_b))|^2 / sigma_px^2)         one observation (u, v)
 // + sum rho(|wrap(measured - scale p(t'))|^2 / sigma_rad^2)              one telemetry sample
 // + priors,        t' = t_telemetry - shift + drift (t_telemetry - reference).
-// A is the row-time effect of (Oth 18 to 21); A^-1 e is the residual of the full rolling-shutter
-// projection.
+// l is the line delay. A is the row-time effect of (Oth 18 to 21): A^-1 e is the residual of the
+// full rolling-shutter projection.
 // Angles in rad, times in s on the image clock. Allocates. Derivation: docs/derivations.md.
 
 #include <Eigen/Core>
@@ -34,27 +34,27 @@ using GlobalVector = Eigen::Matrix<double, kGlobalCount, 1>;
 using GlobalMatrix = Eigen::Matrix<double, kGlobalCount, kGlobalCount>;
 
 struct AdjustmentObservation {
-  int landmark = 0;
-  int frame = 0;
-  Vector2<double> u;
-  double sigma = 1;  // px
-  bool used = true;  // false: an outlier
+  int landmark = 0;   // index into AdjustmentState::landmarks
+  int frame = 0;      // index into AdjustmentData::frame_time_s
+  Vector2<double> u;  // px, (u, v)
+  double sigma = 1;   // px, of u and of v
+  bool used = true;   // false: an outlier
 };
 
 struct AdjustmentTelemetry {
-  double time_s = 0;  // on the telemetry clock
-  Vector2<double> measured;
+  double time_s = 0;                                // on the telemetry clock
+  Vector2<double> measured;                         // rad, (pan, tilt)
   Vector2<double> sigma = Vector2<double>::Ones();  // rad; infinite: this axis is not measured
-  // Whether an axis's residual shows the size of the noise. That of a rounding error does not.
+  // Whether an axis's residual shows the size of the noise. A rounding error's residual does not.
   std::array<bool, 2> is_noise = {true, true};
   bool used = true;
 };
 
 struct AdjustmentData {
-  std::vector<double> frame_time_s;
+  std::vector<double> frame_time_s;                 // of row 0, image clock
   std::vector<AdjustmentObservation> observations;  // sorted by landmark, then frame
   std::vector<AdjustmentTelemetry> telemetry;       // sorted by time
-  double reference_s = 0;                           // time at which the drift has no effect
+  double reference_s = 0;  // telemetry clock: the time at which the drift has no effect
 };
 
 struct AdjustmentState {
@@ -62,26 +62,29 @@ struct AdjustmentState {
   CornerDistortion<double> corner_distortion = CornerDistortion<double>::Zero();
   double readout_s = 0;  // line delay times height
   Mechanics<double> mechanics;
-  double shift_s = 0;
-  double drift = 0;
+  double shift_s = 0;  // telemetry clock = image clock + shift, at reference_s
+  double drift = 0;    // of the telemetry clock against the image clock, s/s
   TrajectorySpline trajectory;
-  // In the camera frame at the anchor's pan and tilt, so that landmarks turn with the axes.
-  // Otherwise, far from zero pan, every change of an axis would be a large change of all landmarks.
+  // Unit directions in the camera frame at the anchor's pan and tilt (rad). So landmarks turn with
+  // the axes: in the base frame, far from zero pan, every change of an axis would be a large change
+  // of all landmarks.
   PanTilt<double> anchor;
   std::vector<Vector3<double>> landmarks;
 
+  // The camera with the distortion that corner_distortion means.
   [[nodiscard]] Camera<double> physical_camera() const;
-  [[nodiscard]] double line_delay() const { return readout_s / camera.height; }
+  [[nodiscard]] double line_delay() const { return readout_s / camera.height; }  // s/row
 };
 
-// A Gaussian prior on each local parameter; information 0: none. Axes: in the tangent basis of the
-// prior's axes.
+// A Gaussian prior on each local parameter: mean and 1 / sigma^2. Information 0: no prior. Axes: in
+// the tangent basis of the prior's axes.
 struct AdjustmentPriors {
   AdjustmentState mean;  // its trajectory and landmarks are unused
   GlobalVector information = GlobalVector::Zero();
 };
 
-// Cauchy: rho(x) = c^2 log(1 + x / c^2). Infinite scales give least squares.
+// Cauchy: rho(x) = c^2 log(1 + x / c^2). The scales c count sigmas; infinite scales give least
+// squares.
 struct LossScales {
   double pixel = std::numeric_limits<double>::infinity();
   double telemetry = std::numeric_limits<double>::infinity();
@@ -90,9 +93,9 @@ struct LossScales {
 // Residual e of one observation or sample at the current state, and its derivative by (pan, tilt).
 // Both in units of sigma, times the square root of the robust weight.
 struct LinearisedResidual {
-  double time_s = 0;
-  int segment = 0;
-  bool valid = false;
+  double time_s = 0;   // at which the trajectory is read
+  int segment = 0;     // of the trajectory
+  bool valid = false;  // it has a projection; also said of what is not in use
   Vector2<double> error;
   Matrix2<double> J_angle;
 };
@@ -101,9 +104,9 @@ using NormalMatrix = BorderedBand<kGlobalCount>;
 
 struct Linearisation {
   double cost = 0;    // sum of rho
-  bool valid = true;  // every used observation has a projection
-  std::vector<LinearisedResidual> observations;
-  std::vector<LinearisedResidual> telemetry;
+  bool valid = true;  // least squares: every used observation has a projection; else always true
+  std::vector<LinearisedResidual> observations;  // by index in AdjustmentData
+  std::vector<LinearisedResidual> telemetry;     // likewise
 
   // Normal equations H x = g: control points (two rows each), then the parameters.
   NormalMatrix H;
@@ -112,7 +115,9 @@ struct Linearisation {
   // Landmarks: H_ll, g_l, and rows of H_cl for the touched control points and the camera.
   std::vector<Matrix2<double>> H_landmark;
   std::vector<Vector2<double>> g_landmark;
-  std::vector<std::size_t> touched_begin;  // into the two below; one more than landmarks
+  // Landmark l touches the control points touched[touched_begin[l]] to before
+  // touched[touched_begin[l + 1]]; so one more than there are landmarks.
+  std::vector<std::size_t> touched_begin;
   std::vector<int> touched;
   std::vector<Matrix2<double>> H_touched;
   std::vector<Eigen::Matrix<double, kObservedCount, 2>> H_camera;
@@ -120,11 +125,12 @@ struct Linearisation {
 
 // The parameters' rows of H^-1, with landmarks eliminated; as many columns as H.
 using GlobalRows = Eigen::Matrix<double, kGlobalCount, Eigen::Dynamic>;
-// Change of the parameters with the error of one observation, in units of its sigma.
+// Change of the parameters per error of one observation; the error is in units of its sigma.
 using Influence = Eigen::Matrix<double, kGlobalCount, 2>;
 
 // d (prediction of a telemetry sample, in units of its sigma) / d (pan scale, tilt scale, shift,
-// drift), which are the last parameters.
+// drift): the parameters from kObservedCount on. angle, rate: of the trajectory at the sample, rad
+// and rad/s.
 using TelemetryJacobian = Eigen::Matrix<double, 2, kGlobalCount - kObservedCount>;
 [[nodiscard]] TelemetryJacobian telemetry_jacobian(const Mechanics<double>& mechanics,
                                                    const AdjustmentTelemetry& sample,
@@ -132,10 +138,11 @@ using TelemetryJacobian = Eigen::Matrix<double, 2, kGlobalCount - kObservedCount
                                                    const Vector2<double>& angle,
                                                    const Vector2<double>& rate);
 
-// An observation in use at a state, with what departures from the model act on
-// (departure_score.h). Derivatives are of the projection, in units of sigma.
+// An observation in use at a state, with everything on which departures from the model act
+// (departure_score.h). error and J are as in LinearisedResidual; the J are derivatives of the
+// projection.
 struct ObservationRow {
-  std::size_t index = 0;
+  std::size_t index = 0;  // in AdjustmentData
   int landmark = 0;
   double time_s = 0;
   TrajectorySpline::Basis basis;
@@ -143,15 +150,15 @@ struct ObservationRow {
   Matrix2<double> J_angle;
   Matrix2<double> J_landmark;
   Eigen::Matrix<double, 2, kObservedCount> J_camera;
-  Matrix2<double> whiten;  // A^-1 / sigma: from a displacement in px to units of sigma
-  Vector3<double> d_c;
+  Matrix2<double> whiten;       // A^-1 / sigma: from a displacement in px to units of sigma
+  Vector3<double> d_c;          // unit direction of the landmark
   Matrix<double, 2, 3> J_u_dc;  // px
   Vector2<double> u_rate;       // px/s, of the landmark's image
 };
 
 // A telemetry sample in use, likewise.
 struct TelemetryRow {
-  std::size_t index = 0;
+  std::size_t index = 0;  // in AdjustmentData
   double time_s = 0;
   TrajectorySpline::Basis basis;
   Vector2<double> error;
@@ -161,6 +168,8 @@ struct TelemetryRow {
   std::array<bool, 2> is_noise{};  // as in AdjustmentTelemetry
 };
 
+// Adds a solution of the normal equations to the state: x to trajectory and parameters, x_landmark
+// to the landmarks' directions.
 void apply_step(const Eigen::VectorXd& x, const std::vector<Vector2<double>>& x_landmark,
                 AdjustmentState* state);
 
@@ -171,14 +180,14 @@ class Lineariser {
              const std::array<bool, kGlobalCount>& fixed)
       : data_(data), priors_(priors), fixed_(fixed) {}
 
-  // As if it had been fixed from the start.
+  // The parameter is fixed from now on, as if it had been from the start.
   void hold(int parameter) { fixed_[static_cast<std::size_t>(parameter)] = true; }
 
   // Replaces all that *out holds, and reuses its memory.
   void linearise(const AdjustmentState& state, const LossScales& loss, Linearisation* out);
 
-  // Of each observation; zero if it is not used. at: least squares at this state. inverse: rows of
-  // its H^-1.
+  // The influence of each observation; zero if it is not used. at: least squares at this state.
+  // inverse: the parameters' rows of the inverse of at.H, landmarks eliminated.
   [[nodiscard]] std::vector<Influence> influences(const AdjustmentState& state,
                                                   const Linearisation& at,
                                                   const GlobalRows& inverse) const;

@@ -2,10 +2,10 @@
 // Clock offset and focal length from motion alone, without a guess. Over some 0.5 s the image moves
 // by
 //   (-f cos(tilt) dpan, f dtilt).
-// The clock offset d is the shift of time at which the tracks' median motion correlates best with
-// the telemetry's. f is the ratio of the two motions there. Medians and the normalised correlation
-// need neither a guess of f nor clean tracks. Small tilt and nominal axes are assumed: good to some
-// percent, which the robust adjustment removes. Allocates.
+// The clock offset is the shift of time at which the tracks' median motion correlates best with
+// the telemetry's. f is the ratio of the two motions at the best shift. Medians and the normalised
+// correlation need neither a guess of f nor clean tracks. Small tilt and nominal axes are assumed.
+// The result is good to some percent; the robust adjustment removes this error. Allocates.
 
 #include <vector>
 
@@ -15,26 +15,27 @@ namespace alidade::internal {
 
 // The median motion of the tracks from one frame to another.
 struct ImageMotion {
-  double from_s = 0;
-  double to_s = 0;
+  double from_s = 0;      // image clock
+  double to_s = 0;        // image clock
   Vector2<double> shift;  // px
 };
 
-// Motions over about baseline_s, along chains of frames that share landmarks.
+// Motions over about baseline_s, one for each frame from which a chain of frames leads so far.
+// Neighbours in a chain share three landmarks or more.
 [[nodiscard]] std::vector<ImageMotion> image_motion(const AdjustmentData& data, double baseline_s);
 
 struct MotionMatch {
-  double shift_s = 0;  // telemetry time = image time + shift_s
-  double focal_length = 0;
-  double correlation = 0;  // of the motions, 1 = perfect
-  bool at_edge = false;    // of the range that was searched
-  bool apart = false;      // at each shift most of the image's motions lack telemetry
-  double centre_s = 0;     // centre of the search
-  double half_range_s = 0;
+  double shift_s = 0;       // telemetry time = image time + shift_s
+  double focal_length = 0;  // px
+  double correlation = 0;   // of the motions, 1 = perfect; 0: no match, shift and f say nothing
+  bool at_edge = false;     // the best shift is at an end of the range that was searched
+  bool apart = false;       // at every shift fewer than half of the image's motions have telemetry
+  double centre_s = 0;      // centre of the search
+  double half_range_s = 0;  // of the search
 };
 
-// The best shift within half_range_s of centre_s, to 0.1 ms. signs: factors of pan and tilt; -1
-// reverses one.
+// The best shift within half_range_s of centre_s, to 0.1 ms. telemetry: over the telemetry clock.
+// signs: factors of pan and tilt; -1 reverses an axis.
 [[nodiscard]] MotionMatch match_motion(const std::vector<ImageMotion>& motion,
                                        const TrajectorySpline& telemetry, double centre_s,
                                        double half_range_s, const Vector2<double>& signs = {1, 1});
@@ -45,8 +46,9 @@ struct ReversedAxes {
   bool tilt = false;
 };
 
-// The axes whose reversal explains much more of the image's motion. match: the result without
-// reversal. None if the recording does not show it. Takes three times as long as
+// The axes whose reversal leaves at most a third of what is unexplained without it, 1 -
+// correlation^2. match: the result without reversal. None if both motions correlate by less than
+// 0.9, or the motion about a reversed axis by less than 0.8. Takes three times as long as
 // match_motion().
 [[nodiscard]] ReversedAxes reversed_axes(const std::vector<ImageMotion>& motion,
                                          const TrajectorySpline& telemetry,

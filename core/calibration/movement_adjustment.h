@@ -3,10 +3,11 @@
 //   sum |A^-1 (u - pi(R(p(t + v l))^T d; f, k, c at t + v l))|^2 / sigma_px^2
 // + sum |measured - scale p|^2 / sigma_rad^2           telemetry, unwrapped, with a robust loss
 // + sum |n_i|^2 / sigma_i^2
-// over splines of pan, tilt and log f (constant at either dwell), directions d, and n: distortion
-// and centre minus the curve's at places along the movement, sigma_i from the curve. A: as in
-// linearisation.h, with f's rate. Line delay, axes, scales and clock offset are fixed.
-// The loss of observations is robust first, then least squares on the inliers. Allocates.
+// over splines of pan, tilt and log f (constant at either dwell), directions d, and n. n is the
+// difference of distortion and centre from the curve's, at places along the movement; sigma_i is
+// the curve's. A: as in linearisation.h, with f's rate. Line delay, axes, scales and clock offset
+// are fixed. The loss of observations is robust first, then least squares on the inliers.
+// Allocates.
 
 #include <Eigen/Core>
 #include <string>
@@ -26,11 +27,12 @@ class ZoomMotionSpline : public CubicSpline<3, ZoomMotionSpline> {
 };
 
 struct MovementData {
-  AdjustmentData input;             // frames' times, tracks, telemetry with unwrapped angles
-  std::vector<ZoomReading> passed;  // image clock; last of the first dwell to first of the second
-  double begin_s = 0;               // image clock; the span that is used
-  double rest_ends_s = 0;           // until then f is the first dwell's
-  double rest_begins_s = 0;         // from then on f is the second dwell's
+  AdjustmentData input;  // frames' times, tracks, telemetry with unwrapped angles
+  // Image clock; from the last reading of the first dwell to the first reading of the second dwell.
+  std::vector<ZoomReading> passed;
+  double begin_s = 0;        // image clock, as are the next three: the span that is used
+  double rest_ends_s = 0;    // until then f is the first dwell's
+  double rest_begins_s = 0;  // from then on f is the second dwell's
   double end_s = 0;
   double frame_period_s = 0;
   double pan_tilt_sigma_rad = 0;  // 0: estimated from the residuals
@@ -38,8 +40,8 @@ struct MovementData {
   int height = 0;
 };
 
-// Order of the unknowns: the control points' pan and tilt, log f of the first dwell, of the second,
-// of the control points between, n.
+// Order of the unknowns: the control points' pan and tilt, log f of the first dwell, log f of the
+// second dwell, log f of the control points between, n. Times on the image clock.
 class MovementAdjustment {
  public:
   // curve: start values, distortion, centre and shared parameters. It must outlive this object.
@@ -56,13 +58,15 @@ class MovementAdjustment {
 
   // After run().
   [[nodiscard]] double log_f(double time_s) const { return spline_.value(basis(time_s))[2]; }
+  // 1/s.
   [[nodiscard]] double log_f_rate(double time_s) const {
     return spline_.derivative(basis(time_s))[2];
   }
   // d log f / d unknowns.
   [[nodiscard]] Eigen::VectorXd log_f_row(double time_s) const;
-  // Of the unknowns; enlarged if the residuals exceed their sigmas.
+  // Covariance of the unknowns; enlarged if the residuals exceed their sigmas.
   [[nodiscard]] const Eigen::MatrixXd& covariance() const { return covariance_; }
+  // RMS of all residuals over their sigmas, redundancy accounted for.
   [[nodiscard]] double pixel_sigma_ratio() const { return pixel_sigma_ratio_; }
 
  private:

@@ -1,12 +1,12 @@
 #pragma once
-// add_movements(): adds to a curve's evidence what movements of the zoom show. With g the curve,
-// v_A and v_B log f at the dwells, l_i log f where reading z_i was passed, w the way in log f (0 to
-// 1):
+// add_movements(): adds to a curve's evidence what movements of the zoom show. g is the curve, v_A
+// and v_B are log f at the dwells A and B before and after the movement, l_i is log f where reading
+// z_i was passed, w_i the share of the way from v_A to v_B (0 to 1):
 //   l_i = g(z_i) + eps(w_i) + rate_i late + noise_i        (derivation: docs/calibration.md)
 // f does not jump: eps(0) = v_A - g(z_A), eps(1) = v_B - g(z_B). Between, eps has the covariance
-// repeatability^2 (1 - |w - w'|). `late` is one number for all movements: the reading's age against
-// the angles (zoom_fit.h) plus the clock offset's error. noise: MovementObservation::covariance.
-// The curve gets nodes of g at each z_i and at the dwells' readings. Allocates.
+// repeatability^2 (1 - |w - w'|). late (s) is one number for all movements: the reading's age
+// (zoom_fit.h) plus the clock offset's error. noise_i: MovementObservation::covariance. The curve
+// gets nodes of g at each z_i and at the dwells' readings. Allocates.
 
 #include <cstddef>
 #include <vector>
@@ -16,9 +16,9 @@
 
 namespace alidade::internal {
 
-// clock_sigma_s: of the clock offset. node_of: the node of each calibration; updated as nodes are
-// inserted. Readings for which the curve has no room are left out. False: a covariance is not
-// positive.
+// clock_sigma_s: of the clock offset. node_of: the node of each calibration of fit_zoom(); updated
+// when nodes are inserted. Readings for which the curve has no room are left out. False: a
+// covariance is not positive definite.
 [[nodiscard]] bool add_movements(const std::vector<MovementObservation>& movements,
                                  const ZoomFitOptions& options, double clock_sigma_s,
                                  std::vector<int>* node_of, ZoomEvidence* evidence);

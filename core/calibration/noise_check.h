@@ -7,10 +7,10 @@
 
 namespace alidade::internal {
 
-// Residual over stated noise, and the degrees of freedom behind it.
+// Residual over stated noise.
 struct NoiseRatio {
-  double ratio = 1;
-  double redundancy = 0;
+  double ratio = 1;       // root mean square, redundancy accounted for
+  double redundancy = 0;  // degrees of freedom behind the ratio
 
   // Whether the ratio is off beyond chance: ratio^2 has a standard deviation of
   // sqrt(2 / redundancy).
@@ -26,9 +26,9 @@ struct NoiseRatios {
 };
 
 // Size of the residuals against the stated noise. Of m residuals with n unknowns, m - n degrees of
-// freedom remain (Helmert). Telemetry determines trace(H^-1 H_telemetry) of the unknowns
-// (telemetry_unknowns, by Adjustment::covariance()), the observations the rest. at: the minimum of
-// least squares.
+// freedom remain (Helmert). telemetry_unknowns: the number of unknowns that telemetry determines,
+// trace(H^-1 H_telemetry) (Adjustment::covariance()); the observations determine the others. at:
+// the minimum of least squares.
 [[nodiscard]] NoiseRatios noise_ratios(const AdjustmentData& data, const AdjustmentState& state,
                                        const Linearisation& at, double telemetry_unknowns);
 
@@ -36,6 +36,7 @@ struct NoiseRatios {
 // correlations of their errors, up to the first negligible one. About 1 for independent errors.
 // Errors repeat if a patch looks different in another light or moves across another part of the
 // lens; they then average out less than the count of observations says. landmarks: their number.
+// at: the minimum of least squares.
 [[nodiscard]] double repetition(const AdjustmentData& data, std::size_t landmarks,
                                 const Linearisation& at);
 

@@ -12,7 +12,7 @@ namespace alidade {
 // The shortest text that reads back as the same bits: 55.4 rather than 55.399999999999999.
 [[nodiscard]] std::string exact_text(double value);
 
-// For messages: up to 6 digits.
+// For messages: up to 6 significant digits.
 [[nodiscard]] std::string short_text(double value);
 
 // The texts below are for people and never show -0.
@@ -22,6 +22,7 @@ namespace alidade {
 // An estimate and its standard deviation: two digits of sigma, and the value to the same decimals.
 // sigma 0: the value is exact and gets up to 10 digits.
 [[nodiscard]] std::string value_text(double value, double sigma);
+// sigma with two digits; "exact" if it is 0.
 [[nodiscard]] std::string sigma_text(double sigma);
 // Both: "940.12 +- 0.34 px", or "940 px, exact". unit may be empty.
 [[nodiscard]] std::string estimate_text(double value, double sigma, const std::string& unit);

@@ -1,6 +1,6 @@
 #pragma once
-// Covariance to information and back. Some of the quantities may be exact, and their units may
-// differ by many orders of magnitude (px beside s/row). Pure; allocates.
+// Covariance to information and back. Some of the quantities may be exact, and the numbers may
+// differ by many orders of magnitude with their units (px beside s/row). Pure; allocates.
 
 #include <Eigen/Core>
 #include <vector>
@@ -15,7 +15,7 @@ namespace alidade::internal {
 [[nodiscard]] Eigen::MatrixXd scaled_inverse(const Eigen::MatrixXd& matrix);
 
 // scaled_inverse() of the rows and columns at `places`, embedded in a matrix of full size that is
-// zero elsewhere. Empty if that part is not positive definite or `places` is empty.
+// zero elsewhere. Empty if the part at `places` is not positive definite or `places` is empty.
 [[nodiscard]] Eigen::MatrixXd inverse_over(const Eigen::MatrixXd& matrix,
                                            const std::vector<int>& places);
 

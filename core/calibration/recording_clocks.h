@@ -11,13 +11,14 @@ namespace alidade::internal {
 struct RecordingClocks {
   ClockLine image;
   ClockLine telemetry;
-  double telemetry_common_sigma_s = 0;  // CalibrationNoise
+  double telemetry_common_sigma_s = 0;  // as in CalibrationNoise
 
-  // s^2; the variance of the clock offset due to the stamps. Motion does not reduce it.
+  // s^2; the part of the clock offset's variance that comes from the stamps. Motion does not reduce
+  // it.
   [[nodiscard]] double stamps_variance() const;
 };
 
-// Relative variance of the period of a steady clock; 0 if the clock is not steady.
+// Variance of the period divided by the period's square; 0 if the clock is not steady.
 [[nodiscard]] double period_variance(const ClockLine& clock);
 
 [[nodiscard]] StreamTiming timing_of(const ClockLine& clock);

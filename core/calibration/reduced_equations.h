@@ -1,10 +1,10 @@
 #pragma once
 // ReducedEquations: S x = b with S = H - Y Y^T (landmark_elimination.h) for long recordings. S is
-// dense where a path returns to what it saw before; H and Y are sparse. Conjugate gradients need
-// only products with S. So time and memory grow with the observations, not with the square or cube
-// of the control points.
+// dense where a path returns to a scene that was seen before; H and Y are sparse. Conjugate
+// gradients need only products with S. So time and memory grow with the observations, not with the
+// square or cube of the control points.
 // Preconditioner: M = [B C^T; C D], with B the control points' block of H (a band, as if landmarks
-// were known), C and D the parameters' rows of S. B is larger than that block of S, so M is
+// were known), C and D the parameters' rows of S. B is larger than the same block of S, so M is
 // positive definite if S is. Some 20 to 40 steps at any length (docs/measurements.md).
 // Allocates. Derivation: docs/calibration.md.
 
@@ -34,8 +34,8 @@ class ReducedEquations {
   // The parameters' block of S.
   [[nodiscard]] const GlobalMatrix& parameters() const { return corner_; }
 
-  // Iterates until the error is some `tolerance` of x, both by the norm x^T S x. False if that
-  // takes too many steps.
+  // b, x: as many rows as H. Iterates until the error is about `tolerance` times x, both by the
+  // norm x^T S x. False if this takes too many steps.
   [[nodiscard]] bool solve(const Eigen::VectorXd& b, double tolerance, Eigen::VectorXd* x) const;
 
  private:

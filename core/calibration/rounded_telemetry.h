@@ -1,6 +1,6 @@
 #pragma once
-// Telemetry whose angles are multiples of a step (its resolution): what it measures, and how
-// uncertain that is. Angles rad, times s. Allocates. Derivation: docs/calibration.md.
+// Telemetry whose angles are multiples of a step (the resolution): what it measures, and with which
+// sigma. Angles rad, times s. Allocates. Derivation: docs/calibration.md.
 
 #include <cstddef>
 #include <vector>
@@ -9,7 +9,7 @@
 
 namespace alidade::internal {
 
-// The step of which all readings of an axis are multiples; the larger one of the two axes; 0 if
+// The step of which all readings of an axis are multiples; the larger step of the two axes; 0 if
 // there is none.
 [[nodiscard]] double angle_resolution(const std::vector<AdjustmentTelemetry>& telemetry);
 
@@ -21,9 +21,9 @@ void set_telemetry_sigma(double white_sigma, double resolution, double stamp_sig
 
 // Removes the bias of rounding. While an axis moves by less than two steps from sample to sample,
 // rounding errors are not noise: the readings stay off to one side until the axis reverses. But
-// between two readings one step apart the axis passed half-way between them. That becomes a sample
+// between two readings one step apart the axis passed their middle. This passage becomes a sample
 // at the middle of their times (trajectory time = telemetry time - shift_s). A run of equal
-// readings together keeps the weight of one reading with sigma = resolution: enough to hold what
+// readings keeps the weight of one reading with sigma = resolution, enough to hold an axis that
 // nothing else holds. White noise of a quarter of the resolution or more dithers the readings: they
 // stay as they are. source[i]: index of the sample behind item i, of the first if there are two.
 [[nodiscard]] std::vector<AdjustmentTelemetry> add_crossings(

@@ -18,8 +18,8 @@ struct ErrorGrowth {
   GlobalVector freedom = GlobalVector::Zero();  // independent clusters behind it; 0: none
 };
 
-// cluster: that of each observation, 0 to clusters - 1. covariance: of the parameters, zero where
-// fixed.
+// cluster: of each observation, 0 to clusters - 1. at: the minimum of least squares. influences: of
+// each observation there. covariance: of the parameters, zero where fixed.
 [[nodiscard]] ErrorGrowth error_growth(const std::vector<int>& cluster, int clusters,
                                        const AdjustmentData& data, const Linearisation& at,
                                        const std::vector<Influence>& influences,
@@ -30,7 +30,7 @@ struct ErrorGrowth {
                                                const std::vector<Influence>& influences,
                                                const GlobalMatrix& covariance);
 
-// covariance with the observations' part of it grown.
+// The covariance, its part from the observations multiplied by `growth`; the priors' part stays.
 [[nodiscard]] GlobalMatrix grown_covariance(const std::vector<Influence>& influences,
                                             const GlobalVector& growth,
                                             const GlobalMatrix& covariance);

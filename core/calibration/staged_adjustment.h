@@ -14,7 +14,7 @@
 
 namespace alidade::internal {
 
-// At the minimum of least squares.
+// At the minimum of least squares. covariance: of the parameters, scaled as in linearisation.h.
 struct Adjusted {
   AdjustmentState state;
   Linearisation at;
@@ -24,7 +24,7 @@ struct Adjusted {
 
 class StagedAdjustment {
  public:
-  // *selected must outlive this object, which sets outliers, noise and crossings in it, and
+  // *selected must outlive this object. The adjustment sets outliers, noise and crossings in it and
   // subtracts departures from its telemetry.
   StagedAdjustment(const StartValues& start, const TelemetryAngleNoise& noise,
                    const CalibrationOptions& options, SelectedInput* selected);
@@ -39,13 +39,14 @@ class StagedAdjustment {
   // Least squares on the rest, as a robust loss on good data would inflate the sigmas. Outliers are
   // marked again. Noise levels that the residuals contradict beyond chance are replaced by the
   // residuals' (noise_check.h). The covariance grows if residuals move the parameters together
-  // (shared_errors.h), and if parts of the recording contradict each other (contradictions.h), with
-  // the optical centre held (centre_share.h). Sets the quality's steps, ratios, repetition and
-  // contradiction.
+  // (shared_errors.h), and if parts of the recording contradict each other (contradictions.h); the
+  // optical centre is held meanwhile (centre_share.h). Sets the quality's steps, ratios, repetition
+  // and contradiction. After adjust_robustly().
   [[nodiscard]] StageStatus adjust_on_inliers(CalibrationQuality* quality);
 
+  // After adjust_on_inliers() returned ok.
   [[nodiscard]] const Adjusted& adjusted() const { return adjusted_; }
-  // Observations that were left out as they drift.
+  // The number of observations that were left out because they drift.
   [[nodiscard]] int drifting() const { return drifting_; }
 
  private:

@@ -1,9 +1,9 @@
 #pragma once
 // Third and fourth stage of calibrate(): start values for the adjustment, from the data alone.
-//   find_motion    smooths and weighs telemetry and matches it with the image's motion: clock
-//                  offset and focal length, or why there are none
-//   start_values   leaves out what lies outside the other stream's time span; then trajectory from
-//                  telemetry, landmarks as medians of their observed directions, priors
+//   find_motion    smooths and weighs telemetry and matches it with the image's motion. Finds clock
+//                  offset and focal length, or says why there are none
+//   start_values   leaves out what lies outside the other stream's time span. Sets the trajectory
+//                  from telemetry, landmarks as medians of their observed directions, and priors
 //                  (adjustment_priors.h)
 // Allocates.
 
@@ -20,7 +20,7 @@ namespace alidade::internal {
 // Errors of the telemetry's angles.
 struct TelemetryAngleNoise {
   double resolution_rad = 0;   // 0: angles are not rounded
-  double white_sigma_rad = 0;  // without rounding
+  double white_sigma_rad = 0;  // of the noise beside the rounding
 };
 
 struct MotionStart {
@@ -47,8 +47,8 @@ struct StartValues {
                                        SelectedInput* selected, CalibrationExclusions* excluded,
                                        StartValues* start);
 
-// Sets the landmarks, in the anchor's frame, from the state's camera, mount and trajectory: medians
-// of the directions of their observations, component by component.
+// Sets state->landmarks (camera frame at the anchor) from the state's camera, mechanics and
+// trajectory: medians of the directions of their observations, component by component.
 void initialise_landmarks(const AdjustmentData& data, AdjustmentState* state);
 
 }  // namespace alidade::internal

@@ -14,7 +14,8 @@
 
 namespace alidade {
 
-// One line: where, what is wrong; what would be right. Readers throw it, read_yaml() catches it.
+// Its text is one line: where, what is wrong; what would be right. Readers throw it, read_yaml()
+// catches it.
 struct YamlError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
@@ -28,11 +29,12 @@ enum class KeyFault {
   kUnknown
 };
 
-// The first key of a mapping with a fault. known: the allowed keys; empty: any.
 struct FaultyKey {
   KeyFault fault;
   YAML::Node key;
 };
+// The first key with a fault; empty: there is none. map: must be a mapping. known: the allowed
+// keys; empty: any.
 [[nodiscard]] std::optional<FaultyKey> find_faulty_key(const YAML::Node& map,
                                                        const std::vector<std::string>& known = {});
 
@@ -42,8 +44,8 @@ struct NotYaml {
   const char* after;
 };
 
-// Hands the parsed text to `read`, which may throw YamlError. False and one line in *error if it
-// did, or if the text is not YAML. name stands for the file in errors.
+// Hands the parsed text to `read`, which may throw YamlError. False and one line in *error if
+// `read` threw, or if the text is not YAML. name stands for the file in errors.
 [[nodiscard]] bool read_yaml(const std::string& text, const std::string& name,
                              const NotYaml& not_yaml,
                              const std::function<void(const YAML::Node&)>& read,

@@ -1,11 +1,11 @@
 #pragma once
 // TelemetryDepartures: what telemetry reads beside the scaled angle, noise and steps, axis by axis:
 //   measured = scale angle + g(angle) + play     (core/model/telemetry_error.h, play.h)
-// The values of g at its knots and the width of the play are linear parameters that touch the
-// telemetry's residuals only. Whether they are there, how large and how smooth, the evidence says
-// (departure_evidence.h). Their posterior is subtracted from the readings, and its covariance adds
-// to that of all parameters. Where nothing is found, nothing changes. Angles rad. Allocates.
-// Derivation: docs/calibration.md.
+// The values of g at its knots and the width of the play are linear parameters; they act on the
+// telemetry's residuals only. The evidence (departure_evidence.h) says whether they are present,
+// how large and how smooth. Their posterior mean is subtracted from the readings, and their
+// posterior covariance adds to the covariance of all parameters. If nothing is found, nothing
+// changes. Angles rad. Allocates. Derivation: docs/calibration.md.
 
 #include <Eigen/Core>
 #include <array>
@@ -21,20 +21,21 @@ namespace alidade::internal {
 
 class TelemetryDepartures {
  public:
-  // fixed: the adjustment's. resolution: the readings' step. accuracy: standard deviation of each
-  // axis's angles that the maker claims; 0: no claim.
+  // fixed: the adjustment's. resolution: the step of the readings; 0: none. accuracy: the standard
+  // deviation that the maker claims for each axis's angles; 0: no claim.
   explicit TelemetryDepartures(const std::array<bool, kGlobalCount>& fixed, double resolution = 0,
                                double accuracy = 0)
       : fixed_(fixed), resolution_(resolution), accuracy_(accuracy) {}
 
-  // Estimates the departures at a minimum of the readings less what was subtracted last. choose:
-  // what is present is chosen anew; else it stays, with its A and L. False if nothing is present,
-  // or nothing can be said.
+  // Estimates the departures in full. state, at: the minimum of least squares with the readings as
+  // they are in `data`, the latest estimate subtracted. choose: the parts that are present are
+  // chosen anew; else the parts stay. False if no part is present and no accuracy is claimed, or if
+  // nothing can be estimated.
   [[nodiscard]] bool estimate(const AdjustmentData& data, const AdjustmentState& state,
                               const Linearisation& at, bool choose, Adjustment* adjustment);
 
-  // Sets the readings to what they were less the departures, their sigmas to what they were, but
-  // larger where the play's state is not known.
+  // Sets the readings to the original ones minus the departures. Sets the sigmas to the original
+  // ones, larger where the state of the play is not known.
   void subtract(const AdjustmentState& state, const Linearisation& at, AdjustmentData* data);
 
   // The adjustment now takes this parameter as exact.
@@ -45,9 +46,9 @@ class TelemetryDepartures {
 
   // By how many standard deviations the latest estimate differs from what was subtracted.
   [[nodiscard]] double change() const { return change_; }
-  // How many unknowns the telemetry determines here.
+  // The number of unknowns that the telemetry determines here.
   [[nodiscard]] double unknowns() const { return fit_.unknowns; }
-  // What the parameters' covariance gains.
+  // To be added to the parameters' covariance; scaled as in linearisation.h.
   [[nodiscard]] const GlobalMatrix& covariance() const { return covariance_; }
   // As estimated.
   [[nodiscard]] TelemetryError error() const;

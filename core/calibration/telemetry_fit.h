@@ -1,7 +1,7 @@
 #pragma once
 // Telemetry as a smooth motion: unwrapped, then a cubic spline by least squares with redescending
 // weights,
-//   w = 1 / (1 + (e / 3 s)^2)^2,   e an error, s the robust standard deviation of all,
+//   w = 1 / (1 + (e / 3 s)^2)^2,   e a residual, s the robust standard deviation of all residuals,
 // so that the pull of an outlier falls with the cube of its size. Measured angles (rad), times in
 // s. Allocates.
 
@@ -15,9 +15,9 @@ namespace alidade::internal {
 // Makes angles continuous: each within half a turn of the median of the five before it.
 void unwrap(std::vector<AdjustmentTelemetry>* telemetry);
 
-// A spline through the samples at time_s - shift_s, from begin_s to end_s. Knots are about
-// spacing_s apart where there are samples. *sigma (if not null): robust standard deviation of the
-// residuals, rad. Nothing with fewer than 8 samples.
+// A spline near the samples, which count at time_s - shift_s, from begin_s to end_s. telemetry:
+// unwrapped. Knots are about spacing_s apart where there are samples. *sigma (if not null): robust
+// standard deviation of the residuals, rad. Empty with fewer than 8 samples.
 [[nodiscard]] std::optional<TrajectorySpline> fit_telemetry(
     const std::vector<AdjustmentTelemetry>& telemetry, double shift_s, double begin_s, double end_s,
     double spacing_s, double* sigma = nullptr);

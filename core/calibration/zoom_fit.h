@@ -28,20 +28,20 @@ struct ZoomFitOptions {
   // The zoom reading may be older or newer than the angles that came with it, by the same time in
   // all movements of a camera.
   double zoom_late_sigma_s = 0.01;
-  // Priors that went into each of the calibrations; they are counted once. 0: none. The axes' are
-  // about the nominal axes. A prior sharper than a calibration's own sigma did not go into that
-  // calibration.
+  // Priors that each of the calibrations used; each prior is counted once. 0: none. The priors of
+  // the axes are about the nominal axes. A prior sharper than a calibration's own sigma was not
+  // used by this calibration.
   double centre_sigma_px = 0;
   double axis_sigma_rad = 0.05;
-  // Of shared parameters except the axes.
+  // Of a shared parameter except the axes, in its unit.
   struct Prior {
     Parameter parameter;
     double value;
     double sigma;
   };
   std::vector<Prior> shared_priors;
-  // Error that all clock offsets share. More calibrations do not average it out: it stays in the
-  // curve's clock offset.
+  // s; standard deviation of an error that all clock offsets share. More calibrations do not
+  // average it out: it stays in the curve's clock offset.
   double common_clock_sigma_s = 0;
   // extend_zoom(): the curve's clock offset is of another connection.
   bool clock_is_another = false;
@@ -50,13 +50,13 @@ struct ZoomFitOptions {
   double two_cameras = 8;
 };
 
-// The options with the priors of calibrations made with these options.
+// The options for calibrations that were made with `made_with`: with its priors.
 [[nodiscard]] ZoomFitOptions zoom_fit_options(const CalibrationOptions& made_with);
 
 struct ZoomFit {
   ZoomCurve curve;
-  // Of all calibrations against the curve; with extend_zoom(): of the shared parameters'
-  // difference.
+  // Of all calibrations against the curve; after extend_zoom(): of the difference between the
+  // shared parameters of curve and calibration.
   double chi_square = 0;
   int degrees_of_freedom = 0;  // of chi_square
   int node = 0;                // extend_zoom(): the node of the added calibration
@@ -79,14 +79,15 @@ struct ZoomFit {
                             const std::vector<MovementObservation>& movements,
                             const ZoomFitOptions& options, ZoomFit* fit, std::string* error);
 
-// Advice, one line each: between which readings the focal length is known to worse than `share` of
-// it, as neither a dwell nor a movement covered them.
+// Advice, one line each: readings between which neither a dwell nor a movement was seen, so that
+// the focal length has a sigma of more than `share` of itself.
 [[nodiscard]] std::vector<std::string> zoom_advice(const ZoomCurve& curve, double share = 0.01);
 
 // Adds one calibration to a curve; the result is the same as if all had been fitted together.
 // visit: the node that the calibration observes again, as the zoom has not moved since. Without
-// visit it gets a node of its own, possibly at another node's reading. A curve of kMaxNodes loses
-// the inner node whose neighbours are closest together; what it contributed to the others stays.
+// visit the calibration gets a node of its own, possibly at another node's reading. A curve of
+// kMaxNodes loses the inner node whose neighbours are closest together; its contribution to the
+// other nodes stays. Failure as in fit_zoom().
 [[nodiscard]] bool extend_zoom(const ZoomCurve& curve, const Calibration& added,
                                std::optional<int> visit, const ZoomFitOptions& options,
                                ZoomFit* fit, std::string* error);

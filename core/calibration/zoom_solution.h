@@ -1,5 +1,5 @@
 #pragma once
-// ZoomSolution: least squares over everything that calibrations say about a zoom's nodes, with the
+// ZoomSolution: least squares over the evidence of calibrations about a zoom's nodes, with the
 // curves as prior (steps 2 and 3 of zoom_fit.h). It chooses the roughness by likelihood, then
 // solves for nodes, shared parameters and their covariance. Allocates.
 
@@ -22,10 +22,11 @@ class ZoomSolution {
   // False and one line in *error: something is undetermined.
   [[nodiscard]] bool run(std::string* error);
 
-  // After run(): the residual of a sample against the solution.
+  // After run(): the residual of a sample at a node against the solution.
   [[nodiscard]] ZoomSampleVector left_of(const ZoomSample& sample, int node) const;
+  // The number of shared parameters among `places`.
   [[nodiscard]] int shared_places() const;
-  // False and one line in *error: the focal length is not monotone.
+  // After run(). False and one line in *error: the focal length is not monotone.
   [[nodiscard]] bool curve(ZoomCurve* curve, std::string* error) const;
 
  private:

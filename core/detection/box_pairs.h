@@ -12,7 +12,7 @@ namespace alidade::internal {
   return std::max(box.width, box.height);
 }
 
-// px; the larger of the gaps across and down; negative if they overlap.
+// px; the larger of the gaps across and down; negative if the boxes overlap.
 [[nodiscard]] inline double gap_between(const DetectionBox& a, const DetectionBox& b) {
   const double across = std::max(a.u, b.u) - std::min(a.u + a.width, b.u + b.width);
   const double down = std::max(a.v, b.v) - std::min(a.v + a.height, b.v + b.height);
@@ -24,8 +24,8 @@ namespace alidade::internal {
          at.y() <= box.v + box.height;
 }
 
-// act(u, v) for the pixels on the line between the boxes' middles that are in neither, about a
-// pixel apart.
+// Calls act(u, v) for pixels on the line between the boxes' middles, about a pixel apart, except
+// those inside one of the boxes.
 template <typename Act>
 void each_between(const DetectionBox& a, const DetectionBox& b, Act&& act) {
   const Vector2<double> from = a.middle();

@@ -2,10 +2,10 @@
 // ChangeRegions: from normalised differences z of each pixel (sigmas) to boxes of what has changed.
 //   S(u) = sum of z over the 5x5 pixels around u / its standard deviation in a still scene
 // Touching pixels with |S| >= threshold make a region. A box holds a region's pixels with |z| >=
-// 2.5 and at least a third of the region's largest |z|. Boxes nearer than merge_px, or than 3/4 of
-// the smaller one's size, are merged, up to twice merge_px: farther apart they may be two targets
-// (target_pieces.h). Score: the largest |S|. z is limited to +-6 first, so that single pixels make
-// no region.
+// 2.5 and at least a third of the region's largest |z|. Boxes are merged if they are nearer than
+// merge_px, or nearer than 3/4 of the smaller one's size and twice merge_px: farther apart they may
+// be two targets (target_pieces.h). Score: the largest |S|. z is limited to +-6 first, so that
+// single pixels make no region.
 // The constructor takes all memory: 2 bytes a pixel for z, and kMostRuns runs. For one thread.
 
 #include <cstdint>
@@ -20,21 +20,21 @@ struct ChangeOptions {
   double merge_px = 6;       // boxes that are no farther apart are merged
   double least_size_px = 1;  // of a box, in its larger direction
   double most_size_px = 200;
-  int most_boxes = 64;  // the surest
+  int most_boxes = 64;  // of these the surest are kept
 
   [[nodiscard]] bool validate(const char** error = nullptr) const;
 };
 
-// Standard deviation of a sum of 5x5 z. The noise is separable, so it equals the variance of a sum
-// of five z in a row. White noise smoothed by (1 4 1) / 6 correlates by 8/18 with its neighbour and
-// by 1/18 with the next.
+// Standard deviation of a sum of 5x5 z in a still scene. The noise is separable, so this standard
+// deviation equals the variance of a sum of five z in a row. White noise smoothed by (1 4 1) / 6
+// correlates by 8/18 with its neighbour and by 1/18 with the next but one.
 inline constexpr double kChangeSumSigma = 5 + 2 * (4 * 8.0 + 3 * 1.0) / 18;
 inline constexpr int kMostChangeZ = 6;  // sigmas; limit of a pixel's z
 // Largest possible |S|, sigmas.
 inline constexpr double kMostChangeScore = 25 * kMostChangeZ / kChangeSumSigma;
 
-// Largest |S|, sigmas, of a picture or a part of one. z: width * height, row by row, in 1/kUnit
-// sigma.
+// Largest |S|, sigmas, of an image or a part of one. z: width * height values, row by row, in
+// 1/kUnit sigma.
 [[nodiscard]] double largest_sum(const std::int16_t* z, int width, int height);
 
 class ChangeRegions {

@@ -1,7 +1,7 @@
 #pragma once
-// DetectionBox: a detection in a picture, found by this folder or elsewhere: its smallest upright
-// rectangle and its score. Pixels as in CONVENTIONS.md: the box spans [u, u + width] x [v, v +
-// height]. One around the top-left pixel alone is (0, 0, 1, 1).
+// DetectionBox: a detection in an image, found by this folder or by another program: its smallest
+// upright rectangle and its score. Pixels as in CONVENTIONS.md: the box spans [u, u + width] x
+// [v, v + height]. The box around the top-left pixel alone is (0, 0, 1, 1).
 
 #include <string>
 
@@ -14,14 +14,15 @@ struct DetectionBox {
   double v = 0;       // px, upper edge
   double width = 0;   // px
   double height = 0;  // px
-  double score = 1;   // larger is surer, on the detector's scale; 0 to 1 from another program
-  std::string name;   // class; empty: unknown
+  double score = 1;   // larger is surer; the scale is the detector's; another program's is 0 to 1
+  std::string name;   // class; empty: unknown; its length is limited where boxes come in
 
+  // px: the middle of the lower edge; the middle of the box.
   [[nodiscard]] Vector2<double> foot() const { return {u + width / 2, v + height}; }
   [[nodiscard]] Vector2<double> middle() const { return {u + width / 2, v + height / 2}; }
 };
 
-// Intersection over union, 0 to 1.
+// Intersection over union, 0 to 1. 0 if the boxes only touch, or one of them is empty.
 [[nodiscard]] double overlap(const DetectionBox& a, const DetectionBox& b);
 
 }  // namespace alidade

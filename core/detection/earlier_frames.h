@@ -1,11 +1,11 @@
 #pragma once
-// EarlierFrames: pictures of the last seconds with their orientations, to compare a picture with.
-// The latest kRecent frames are all kept, as they show what has only just come into view. Of the
-// frames that leave them, one in every spacing_s goes on to a ladder of kLadder, which reaches back
-// kLadder * spacing_s.
-// Order of preference: the ladder, newest first, then the recent ones, oldest first, as slow
-// targets have left their place there. A ladder frame younger than spacing_s comes just before the
-// recent ones. The constructor takes all memory. For one thread.
+// EarlierFrames: images of the last seconds with their orientations, to compare an image with. The
+// latest kRecent frames are all kept, as they show what has only just come into view. When frames
+// become older than these, one in every spacing_s is kept further, in a ladder of kLadder frames
+// that reaches back kLadder * spacing_s.
+// Order of preference: the ladder, newest first; then the recent frames, oldest first, as slow
+// targets have left their place of then. A ladder frame younger than spacing_s comes just before
+// the recent ones. The constructor takes all memory. For one thread.
 
 #include <array>
 #include <cstdint>
@@ -30,11 +30,12 @@ class EarlierFrames {
   EarlierFrames(int width, int height, double spacing_s);
 
   void clear();
-  // image: width x height; later than all before.
+  // image: width x height, copied; its orientation's time is later than all before.
   void add(const ImageView& image, const FrameOrientation& orientation);
 
   [[nodiscard]] int size() const { return recent_.count + ladder_.count; }
-  // Sets the order of preference for a picture of that time. Call it before preferred() and view().
+  // Sets the order of preference for an image of this time. To be called before preferred() and
+  // view().
   void order_for(double time_s);
   [[nodiscard]] const Frame& preferred(int i) const {
     return frames_[static_cast<std::size_t>(order_[static_cast<std::size_t>(i)])];

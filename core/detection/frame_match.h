@@ -1,12 +1,12 @@
 #pragma once
-// match_frames(): small shift and light change that remain between a picture and its prediction
-// from an earlier one by their orientations. Robust least squares over one pixel in 256:
+// match_frames(): the small shift and the change of light between an image and its prediction from
+// an earlier image by the orientations of both. Robust least squares over one pixel in 256:
 //   now(u) = gain V(u) / V(w) then(w) + offset,   w = warp(u) + shift + shear r
 //   r = 2 u_v / height - 1: -1 in the first row, 1 in the last
 //   V(u) = 1 + falloff |u - middle|^2 / (half diagonal)^2
 // Shift and shear: errors of orientation and rates that the frames do not share, up to a pixel or
-// two where there is texture; 0 in flat directions. V: lenses are darker at the corners, through
-// which the scene moves while the camera turns. Moving things are outliers. No allocation.
+// two where there is texture; 0 in directions without texture. V: lenses are darker at the corners,
+// where the scene passes as the camera turns. Moving things are outliers. No allocation.
 
 #include <algorithm>
 #include <cstdint>
@@ -54,8 +54,8 @@ struct FrameMatch {
   Vector2<double> shear = Vector2<double>::Zero();  // px
   double gain = 1;
   double offset = 0;   // grey levels
-  double falloff = 0;  // of the light at the corners, as a share of the middle's; negative: darker
-  double spread = 0;   // of the residuals, robust, over the model's; 1: as expected
+  double falloff = 0;  // of V: light at the corners minus the middle's, as a share of the middle's
+  double spread = 0;   // robust spread of the residuals over the model's; 1: as expected
   int samples = 0;
 
   // r: of the row.
@@ -95,7 +95,7 @@ class CornerDistance {
                                       const TileCorners& warp, int columns, int rows,
                                       const DifferenceModel& model, std::vector<float>* scratch);
 
-// How much of a tile the earlier picture shows, after a shift.
+// How much of a tile is inside the earlier image, after a shift (px, in the earlier image).
 enum class TileSight { kNone, kPart, kAll };
 
 [[nodiscard]] TileSight tile_sight(const TileCorner* upper, const TileCorner* lower,

@@ -1,10 +1,10 @@
 #pragma once
-// FrameWarp: where pixels of one frame are in an earlier one, by both frames' orientations and
+// FrameWarp: where pixels of one frame are in an earlier frame, by both frames' orientations and
 // lenses, each pixel at its own row's time: u_then = pixel_then(direction_now(u_now)).
-// Computed exactly at nodes some 128 px apart; from these cubically interpolated to the corners of
-// tiles of kTile x kTile pixels, and linearly within a tile. With 7 % distortion in the corner and
-// frames half a picture apart the error is below 0.04 px (comparison_test). to() refuses a frame
-// that does not show the directions of all nodes. The constructor takes all memory. One thread.
+// Computed exactly at nodes some 128 px apart; from the nodes interpolated cubically to the corners
+// of tiles of kTile x kTile pixels, and linearly within a tile. With 7 % distortion in the corner
+// and frames half an image apart the error is below 0.04 px (comparison_test). The constructor
+// takes all memory. One thread.
 
 #include <vector>
 
@@ -34,8 +34,8 @@ class FrameWarp {
 
   // Sets the current frame. False: a pixel has no direction.
   [[nodiscard]] bool look(const FrameOrientation& now);
-  // Where its pixels are in an earlier frame. out: corners() elements. False: a node has no pixel
-  // there.
+  // Where the current frame's pixels are in an earlier frame; they may lie outside its image. out:
+  // corners() elements. False: the direction of a node has no pixel in the earlier frame.
   [[nodiscard]] bool to(const FrameOrientation& then, TileCorners* out);
 
  private:

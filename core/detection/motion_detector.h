@@ -1,9 +1,9 @@
 #pragma once
 // MotionDetector: what moves in the scene while the camera turns; for far, small targets. Each
-// pixel is compared with the same direction in up to three earlier pictures (earlier_frames.h,
+// pixel is compared with the same direction in two or three earlier images (earlier_frames.h,
 // frame_warp.h), after a common small shift and the light are estimated (frame_match.h):
 //   z(u) = (now - light then(warp(u) + shift) - offset) / sigma          sigma: DifferenceModel
-// Of at least two such z the smallest counts, or 0 if they differ in sign. 5x5 pixels together
+// Of a pixel's z the smallest in size counts, or 0 if they differ in sign. 5x5 pixels together
 // decide (change_regions.h). Method, reasons and limits: docs/motion_detection.md,
 // docs/derivations.md. The constructor takes all memory, some 12 bytes a pixel; find() allocates
 // nothing. Equal calls give equal results. For one thread.
@@ -22,7 +22,7 @@ namespace alidade {
 struct MotionOptions {
   int width = 1280;        // px, of all pictures
   int height = 720;        // px
-  double spacing_s = 0.3;  // between the five older ones of the earlier pictures
+  double spacing_s = 0.3;  // between the five older ones of the earlier images
   // Remaining error of orientation, lens and air, one sigma.
   double sigma_alignment_px = 0.1;
   // Error due to different blur, one sigma: half of the difference of the blurs' variances.
@@ -45,9 +45,9 @@ enum class MotionStatus {
   kNoOrientation,  // mode none, or its numbers are not finite or describe no camera
   kNotNewer,       // not newer than the picture before
   kBlurred,        // the camera turns too fast for the exposure
-  // Too little of the picture was seen before: the first ones, after a jump or a change of zoom.
+  // Too little of the image was seen before: at the beginning, after a jump or a change of zoom.
   kTooLittleOverlap,
-  // It differs everywhere: light, weather, wrong orientation.
+  // The image differs everywhere: light, weather, wrong orientation.
   kNotExplained
 };
 

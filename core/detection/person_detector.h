@@ -1,12 +1,12 @@
 #pragma once
 // PersonDetector: upright people, by OpenCV's HOG and its SVM (Dalal and Triggs 2005), at the one
 // scale that follows from the world plane (Lisanti et al., section 4.1; target_scale.h).
-// The picture is searched in bands of foot rows within which a person's height varies by less than
+// The image is searched in bands of foot rows; within a band a person's height varies by less than
 // height_step. A band, with room for heads, is scaled so that people are 96 px tall, as the SVM was
 // trained, and searched once. A person of another band, or of a height that does not fit the place
-// of the feet, is dropped; of overlapping ones the surest stays. Outside [least_height_px,
-// most_height_px] nothing is searched. Score: distance from the SVM's plane. Takes scratch memory
-// as OpenCV does: not for the real-time thread. For one thread.
+// of the feet, is dropped; of overlapping ones the surest stays. People of a height outside
+// [least_height_px, most_height_px] are not searched for. Score: distance from the SVM's plane.
+// Takes scratch memory as OpenCV does: not for the real-time thread. For one thread.
 
 #include <memory>
 #include <vector>

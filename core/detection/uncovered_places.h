@@ -1,9 +1,9 @@
 #pragma once
 // drop_uncovered_places(): a large, slow target whose earlier places overlap changes the picture
-// twice: at its front, and behind it, where the scene reappears. The second is no target. If no
-// earlier picture shows the target elsewhere, this picture decides: one of the two became brighter,
-// the other darker, and between them is the target. With a, b mean grey levels of the boxes'
-// changed pixels, m that of the line between their middles:
+// twice: at its front, and behind it, where the scene reappears. The second change is no target. If
+// no earlier image shows the target elsewhere, the present one decides: one of the two places
+// became brighter, the other darker, and the target is between them. With a, b mean grey levels of
+// the boxes' changed pixels, m that of the line between their middles:
 //   |m - a| < |m - b| / 2   =>   a is the front, b was uncovered
 // Conditions and limits: docs/derivations.md.
 

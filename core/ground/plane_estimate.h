@@ -1,6 +1,6 @@
 #pragma once
-// A world plane in the six values of files and answers, with their covariance, and its frame's
-// place on Earth if known. No allocation.
+// A world plane as files and answers state it: six values with their covariance, and the place of
+// its frame w on Earth if known. No allocation.
 
 #include <Eigen/LU>
 #include <array>
@@ -13,7 +13,7 @@ namespace alidade {
 
 struct PlaneEstimate {
   WorldPlane plane;
-  std::optional<GeodeticPosition> origin;  // of the world frame w; if given, x is east, y north
+  std::optional<GeodeticPosition> origin;  // of w; if given, x is east and y is north
 };
 
 // heading, pitch, roll of the base (rad, BaseAttitude); x, y, height of the camera (m).
@@ -21,12 +21,12 @@ inline constexpr std::array<const char*, kPlaneParameterCount> kPlaneValueNames 
     "heading", "pitch", "roll", "x", "y", "height"};
 
 struct PlaneValues {
-  Matrix<double, kPlaneParameterCount, 1> value;
-  PlaneCovariance covariance;
+  Matrix<double, kPlaneParameterCount, 1> value;  // in the order of kPlaneValueNames
+  PlaneCovariance covariance;                     // of value
 };
 
-// The base's forward direction must not point straight up or down (kLeastForward), as heading is
-// then undefined.
+// The base's forward direction must not point straight up or down (kLeastForward): there heading is
+// undefined.
 [[nodiscard]] inline PlaneValues plane_values(const WorldPlane& plane) {
   const BaseAttitude attitude = base_attitude(plane);
   PlaneValues out;

@@ -1,8 +1,9 @@
 #pragma once
 // What is known of the ground under a camera, for fit_plane() (plane_fit.h): any mix of data, each
 // with its errors. Directions are in the base frame, of unit length. Errors of different data are
-// independent, except for sights from one picture, which share the turn of the picture: its look.
-// All sigmas > 0; exact values get a small one. SI and rad. Allocates (names).
+// independent, with one exception: sights from one picture share the error of its orientation, a
+// turn that is called the look. All sigmas > 0; exact values get a small one. m and rad. Allocates
+// (names).
 
 #include <string>
 #include <utility>
@@ -12,10 +13,10 @@
 
 namespace alidade {
 
-// A direction that was seen: the true one, turned by the look's error and its own.
+// A direction that was seen: the true direction, turned by the look's error and by its own error.
 struct PlaneSight {
   Vector3<double> d_b = Vector3<double>::UnitX();
-  Matrix2<double> covariance = Matrix2<double>::Identity();  // rad^2, in tangent_basis(d_b)
+  Matrix2<double> covariance = Matrix2<double>::Identity();  // own, rad^2, in tangent_basis(d_b)
   int look = -1;  // index of PlaneEvidence::looks; -1: none
 };
 
@@ -23,8 +24,8 @@ struct PlaneSight {
 // kPoint: direction to something with a known place in w, on the plane or above it.
 // kHorizon: a direction with elevation 0: of the horizon, or the vanishing point of a line on the
 // plane.
-// kBearing: such a direction with known heading, as of a street in a map.
-// kVertical: vanishing point of upright edges: straight up or straight down.
+// kBearing: as kHorizon, with a known heading, as of a street in a map.
+// kVertical: direction to the vanishing point of upright edges: straight up or straight down.
 // kLength: directions to two points of the plane at a known distance.
 // kUpright: directions to foot and head of something of known height that stands on the plane.
 enum class PlaneDatumKind {
@@ -46,21 +47,23 @@ enum class PlaneDatumKind {
 struct PlaneDatum {
   PlaneDatumKind kind = PlaneDatumKind::kHeight;
   std::string name;
-  PlaneSight sight;                                 // point, horizon, bearing, vertical; foot; from
-  PlaneSight other;                                 // head; to
-  Vector3<double> place = Vector3<double>::Zero();  // m, in w; for a level up_b
+  PlaneSight sight;  // of point, horizon, bearing, vertical; of the foot; of a length's beginning
+  PlaneSight other;  // of the head; of a length's end
+  Vector3<double> place = Vector3<double>::Zero();  // m, in w; kLevel: up, unit length, in base
   Vector3<double> place_sigma = Vector3<double>::Ones();  // m
-  double value = 0;                                       // m or rad
-  double sigma = 1;
+  double value = 0;                                       // height, length: m; heading: rad
+  double sigma = 1;                                       // of value
 };
 
 struct PlaneEvidence {
   std::vector<PlaneDatum> data;
   // Covariance of each look's turn about the base's axes, rad^2.
   std::vector<Matrix3<double>> looks;
-  bool y_is_north = false;  // places are on Earth, so a heading must come from the data
+  // Y of w is north, as places are on Earth: the data must determine the heading.
+  bool y_is_north = false;
 };
 
+// Of the camera above the plane.
 [[nodiscard]] inline PlaneDatum camera_height(double height_m, double sigma_m) {
   PlaneDatum out;
   out.kind = PlaneDatumKind::kHeight;
@@ -70,6 +73,7 @@ struct PlaneEvidence {
   return out;
 }
 
+// X and Y of the camera in w. sigma: of each.
 [[nodiscard]] inline PlaneDatum camera_place(const Vector2<double>& place_m, double sigma_m) {
   PlaneDatum out;
   out.kind = PlaneDatumKind::kPlace;
@@ -79,9 +83,10 @@ struct PlaneEvidence {
   return out;
 }
 
-// Level of the base against gravity, see R_base_from_world_of(). sigma: of each of the two tilts.
+// Pitch and roll of the base against gravity, see R_base_from_world_of(). sigma: of each.
 [[nodiscard]] PlaneDatum base_level(double pitch_rad, double roll_rad, double sigma_rad);
 
+// Of the base's forward direction, clockwise from Y of w.
 [[nodiscard]] inline PlaneDatum base_heading(double heading_rad, double sigma_rad) {
   PlaneDatum out;
   out.kind = PlaneDatumKind::kHeading;

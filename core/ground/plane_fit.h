@@ -1,12 +1,11 @@
 #pragma once
 // fit_plane(): the ground plane from any mix of data (plane_evidence.h) by least squares, with
 // covariance and each datum's misfit; or a refusal with its reason. Allocates; some milliseconds.
-// The covariance of (xi, p) is first order. It grows by chi-square per degree of freedom if that is
-// beyond chance (1 in 1000). A misfit is sqrt(r^T Q^+ r / rank), Q the covariance of the residual r
-// after the fit (Baarda's data snooping); 1 is expected. kMisfit names the datum without which the
-// others agree best. The weakest direction of the information shows what the data leave open. If
-// the data fit either way up, as points of the horizon do, the base's down axis is taken to be
-// below the horizontal.
+// The covariance of (xi, p) is first order. It is multiplied by chi-square per degree of freedom if
+// this exceeds 1 beyond chance (1 in 1000). A misfit is sqrt(r^T Q^+ r / rank), Q the covariance of
+// the residual r after the fit (Baarda's data snooping); 1 is expected. With kMisfit, `worst` is
+// the datum without which the others agree best. If the data fit with either side up, as points of
+// the horizon do, the base's down axis is taken to point below the horizontal.
 
 #include <optional>
 #include <string>
@@ -18,8 +17,8 @@
 namespace alidade {
 
 struct PlaneFitOptions {
-  double gate_sigmas = 5;           // limit of a datum's sqrt(r^T Q^+ r)
-  double most_tilt_sigma = 0.1;     // rad; beyond it the plane is not determined
+  double gate_sigmas = 5;           // largest sqrt(r^T Q^+ r) of a datum; beyond it kMisfit
+  double most_tilt_sigma = 0.1;     // rad; beyond this and the next two, kUndetermined
   double most_heading_sigma = 0.2;  // rad
   double most_height_share = 0.2;   // sigma of the height over the height
 
@@ -41,7 +40,7 @@ enum class PlaneFitStatus {
 
 struct DatumFit {
   std::optional<double> misfit;  // 1 is expected; empty: no other data check it
-  double checked = 0;            // 0 to 1; how far the other data determine it, too
+  double checked = 0;            // 0 to 1; how far the other data determine the same quantity
 };
 
 // plane, data and statistics with kOk and kMisfit.
@@ -53,10 +52,11 @@ struct PlaneFit {
   int worst = -1;              // index of the datum, with kMisfit
   double chi_square = 0;
   int degrees_of_freedom = 0;
-  double noise_scale = 1;  // sqrt(chi-square per degree of freedom); 1 if there is none
-  // x and y of w are the camera's, as no data tie them to the ground.
+  double noise_scale = 1;  // sqrt(chi-square per degree of freedom); 1: no degree of freedom
+  // The origin of w is below the camera, as no data tie the camera's place to the ground.
   bool origin_below_camera = false;
-  bool heading_of_base = false;  // Y of w is below the base's forward direction, likewise
+  // Y of w is below the base's forward direction, as no data give a heading.
+  bool heading_of_base = false;
 };
 
 [[nodiscard]] PlaneFit fit_plane(const PlaneEvidence& evidence,

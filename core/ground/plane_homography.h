@@ -26,7 +26,7 @@ namespace alidade {
   return K;
 }
 
-// Between two pictures from one optical centre: H_infinity.
+// Between two images from one optical centre: H_infinity.
 [[nodiscard]] inline Matrix3<double> image_from_image(const Matrix3<double>& K_to,
                                                       const Matrix3<double>& R_to_from,
                                                       const Matrix3<double>& K_from) {
@@ -41,8 +41,9 @@ namespace alidade {
   return K * R_camera_from_base * plane.R_base_from_world * columns;
 }
 
-// H_p, from the vanishing points (px) of two perpendicular directions of the plane. They become x
-// and y of the rectified picture, so that x, y, up are right-handed. False if the two coincide.
+// H_p, from the vanishing points (px, homogeneous) of two perpendicular directions of the plane.
+// The directions become x and y of the rectified image, so that x, y, up are right-handed. False if
+// the two coincide.
 [[nodiscard]] inline bool rectifying_homography(const Matrix3<double>& K,
                                                 const Vector3<double>& vanishing_x,
                                                 const Vector3<double>& vanishing_y,
@@ -58,8 +59,8 @@ namespace alidade {
   return true;
 }
 
-// H_s: the similarity that takes two points of the rectified picture to their places on the plane,
-// |to_b - to_a| the known length. False if either pair coincides.
+// H_s: the similarity that takes two points of the rectified image to their places on the plane, m.
+// |to_b - to_a| is the known length. False if either pair coincides.
 [[nodiscard]] inline bool similarity(const Vector2<double>& from_a, const Vector2<double>& from_b,
                                      const Vector2<double>& to_a, const Vector2<double>& to_b,
                                      Matrix3<double>* H_s) {
@@ -77,7 +78,7 @@ namespace alidade {
   return true;
 }
 
-// G: plane from image.
+// The image of the horizon, a line. G: plane from image.
 [[nodiscard]] inline Vector3<double> vanishing_line(const Matrix3<double>& G) {
   return G.row(2).transpose();
 }
@@ -87,6 +88,7 @@ namespace alidade {
   return K * (K.transpose() * line);
 }
 
+// mu.
 [[nodiscard]] inline double target_cross_ratio(double target_height_m, double camera_height_m) {
   return 1 - target_height_m / camera_height_m;
 }

@@ -1,12 +1,12 @@
 #pragma once
-// One datum's residual, and its derivatives by the plane and by every error.
+// One datum's residual (m or rad, as the datum) and its derivatives by the plane and every error.
 //   height, place    p minus the datum
 //   heading          heading minus the datum, wrapped
 //   level, vertical  up minus the datum, in its tangent basis
 //   horizon          the direction's elevation
 //   point, bearing   direction minus the sight, in its tangent basis
 //   length           distance of the two places minus the datum
-//   upright          direction of (place of the foot, height) minus the head's sight, likewise
+//   upright          direction of (foot's place, height) minus the head's sight, in its basis
 
 #include <Eigen/Core>
 #include <vector>
@@ -25,12 +25,12 @@ struct PlaneState {
 
 // With size 1 the second row is 0 and its variance is 1.
 struct DatumResidual {
-  int size = 2;
+  int size = 2;  // numbers in r: 1 or 2
   Vector2<double> r = Vector2<double>::Zero();
   Matrix<double, 2, kPlaneParameterCount> J_plane = Matrix<double, 2, kPlaneParameterCount>::Zero();
   Matrix<double, 2, 3> J_sight_look = Matrix<double, 2, 3>::Zero();  // by z of the sight's look
-  Matrix<double, 2, 3> J_other_look = Matrix<double, 2, 3>::Zero();
-  Matrix2<double> covariance = Matrix2<double>::Identity();  // from the datum's own errors
+  Matrix<double, 2, 3> J_other_look = Matrix<double, 2, 3>::Zero();  // by z of the other's look
+  Matrix2<double> covariance = Matrix2<double>::Identity();          // from the datum's own errors
 };
 
 // roots: of the looks' covariances. False: the datum is not defined on this plane, such as a foot

@@ -2,10 +2,10 @@
 // solve_plane(): least squares of a plane from one start, by Levenberg-Marquardt. Minimises
 //   sum r_i^T C_i^-1 r_i + |z|^2     over the plane's unknowns and the looks z (plane_residual.h)
 // The weights C_i^-1 depend on the plane. They are held during a step and renewed after it, so at
-// the end J^T C^-1 r = 0 for the C there.
-// If data tie the camera to w, all six of (xi, p) are unknown. Otherwise w is the camera's
+// the end J^T C^-1 r = 0 with the C of the solution.
+// If data tie the camera to w, all six of (xi, p) are unknown. Otherwise the camera defines w
 // (world_plane.h), and three are unknown; four with a known heading and no place; five with one
-// known place and no heading.
+// known place and no heading. Allocates.
 
 #include <Eigen/Core>
 #include <Eigen/Eigenvalues>
@@ -16,7 +16,7 @@
 
 namespace alidade::internal {
 
-// For matrices of any size, as each size of its own would cost seconds of compilation.
+// For matrices of any size: another type for each size would cost seconds of compilation.
 using SymmetricEigen = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>;
 
 enum class PlaneFrame {
@@ -27,7 +27,7 @@ enum class PlaneFrame {
 };
 
 struct PlaneProblem {
-  const PlaneEvidence& evidence;
+  const PlaneEvidence& evidence;       // borrowed
   std::vector<Matrix3<double>> roots;  // rad; square root of each look's covariance
   PlaneFrame frame = PlaneFrame::kCamera;
   int left_out = -1;  // a datum that is ignored; -1: none
@@ -46,7 +46,7 @@ using PlaneUnknowns = Eigen::Matrix<double, kPlaneParameterCount, Eigen::Dynamic
 
 struct PlaneSolution {
   PlaneState state;
-  std::vector<DatumResidual> residuals;  // of all data; also of one left out, if defined
+  std::vector<DatumResidual> residuals;  // of all data; of the one left out only if it is defined
   PlaneUnknowns unknowns;
   Eigen::MatrixXd information;  // of the unknowns, then z
   double chi_square = 0;
@@ -58,13 +58,13 @@ struct PlaneSolution {
 [[nodiscard]] bool solve_plane(const PlaneProblem& problem, const WorldPlane& start,
                                PlaneSolution* out);
 
-// Chi-square after a change of (unknowns, z), with the solution's weights. Nothing if a datum is
-// not defined there.
+// Chi-square after a change of (unknowns, z), with the solution's weights. Empty if a datum is not
+// defined after the change.
 [[nodiscard]] std::optional<double> chi_square_after(const PlaneProblem& problem,
                                                      const PlaneSolution& solution,
                                                      const Eigen::VectorXd& change);
 
-// d residual / d (unknowns, z).
+// d residual / d (unknowns, z). looks: their number; z has three elements for each.
 [[nodiscard]] Eigen::Matrix<double, 2, Eigen::Dynamic> full_jacobian(const PlaneDatum& datum,
                                                                      const DatumResidual& residual,
                                                                      const PlaneUnknowns& unknowns,

@@ -1,8 +1,8 @@
 #pragma once
-// Starts for the least squares of a plane. Up: from a level or a vertical, or at right angles to
-// the horizon's directions and to the planes of upright targets, or any of fourteen directions.
-// About it eight headings, if data can distinguish them. Place and height follow linearly from the
-// points, or from heights and lengths.
+// Starts for the least squares of a plane. Up comes from a level or a vertical; or it is at right
+// angles to the horizon's directions and to the planes of upright targets; or it is one of fourteen
+// directions. About each up there are eight headings, if data can distinguish them. Place and
+// height follow linearly from the points, or from heights and lengths. Allocates.
 
 #include <vector>
 
@@ -10,7 +10,7 @@
 
 namespace alidade::internal {
 
-// The most likely first, at most `most`.
+// The most likely starts first, at most `most`.
 [[nodiscard]] std::vector<WorldPlane> plane_starts(const PlaneProblem& problem, int most);
 
 }  // namespace alidade::internal

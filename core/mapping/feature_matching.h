@@ -1,9 +1,9 @@
 #pragma once
 // Matches features of two sets: k-d trees of FLANN over 8-bit descriptors (Muja, Lowe 2009) and
-// Lowe's ratio test. A nearest descriptor is accepted if the second nearest is much farther, so
-// that nothing else looks like it. Repeated texture fails this test; what passes by chance must fit
-// a pose (picture_pose.h). If several features match the same one, the nearest keeps it. Equal
-// input gives equal matches. Batch work: allocates.
+// Lowe's ratio test. The nearest descriptor is accepted if the second nearest is much farther, so
+// that nothing else looks like it. Repeated texture fails this test; a match that passes by chance
+// is rejected later, as it fits no pose (picture_pose.h). If several features match the same one,
+// the nearest keeps it. Equal input gives equal matches. Batch work: allocates.
 
 #include <array>
 #include <cstddef>
@@ -17,32 +17,33 @@
 namespace alidade {
 
 struct MatchOptions {
-  // Largest accepted ratio of the distances to the nearest and the second nearest.
+  // Largest accepted ratio, nearest distance over second nearest; 0 to 1.
   double ratio = 0.8;
   int checks = 64;  // leaves of the trees that are searched for each feature
 };
 
 struct FeatureMatch {
-  int query = 0;
-  int indexed = 0;
+  int query = 0;     // index of a feature that was searched for
+  int indexed = 0;   // index of the feature that was found
   double ratio = 0;  // of distances; smaller is surer
 };
 
-// The nearest features by increasing distance. If there are fewer, indexed is -1.
 struct NearFeature {
-  int indexed = -1;
-  float square = std::numeric_limits<float>::infinity();  // squared distance
+  int indexed = -1;                                       // -1: there is none
+  float square = std::numeric_limits<float>::infinity();  // squared distance of the descriptors
 };
+// The nearest features, by increasing distance.
 inline constexpr int kNearFeatures = 4;
 using NearFeatures = std::array<NearFeature, kNearFeatures>;
 
-// Compares with all: exact, and for some thousands faster than trees.
+// One result for each query. Compares with all descriptors: exact, and for some thousands of them
+// faster than trees.
 [[nodiscard]] std::vector<NearFeatures> nearest_features(const std::vector<Descriptor>& queries,
                                                          const std::vector<Descriptor>& indexed);
 
-// The ratio test. is_same(a, b): whether two indexed features show the same thing; if so, the
-// second nearest is not a rival. An empty function: no two do. Returns matches in increasing order
-// of query, each indexed feature at most once.
+// The ratio test. near: by query. is_same(a, b): whether two indexed features show the same thing;
+// if so, the second nearest is not a rival. An empty function: no two do. Returns matches in
+// increasing order of query, each indexed feature at most once.
 [[nodiscard]] std::vector<FeatureMatch> believed_matches(
     const std::vector<NearFeatures>& near, double ratio,
     const std::function<bool(int, int)>& is_same = {});

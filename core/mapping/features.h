@@ -3,9 +3,9 @@
 //   descriptor   r_i = round(512 sqrt(s_i / sum s)), s SIFT's histogram. Euclidean distances of r
 //                are Hellinger distances of s (Arandjelovic, Zisserman 2012).
 //   place        in Alidade's pixels (core/model/lens/camera.h); OpenCV's are half a pixel less.
-//                OpenCV doubles its first image. Before 4.8, and later by default, this moves all
-//                features by a quarter of a pixel. The shift is measured once, on a blob at a known
-//                place, and subtracted.
+//                OpenCV doubles the size of its first image. Before 4.8, and later by default, the
+//                doubling moves all features by a quarter of a pixel. This shift is measured once,
+//                on a blob at a known place, and subtracted.
 // Batch work: allocates. One thread at a time.
 
 #include <array>
@@ -29,20 +29,20 @@ struct Feature {
 };
 
 struct FeatureSet {
-  std::vector<Feature> features;  // the strongest of their cells first
-  std::vector<Descriptor> descriptors;
+  std::vector<Feature> features;        // the strongest of each cell first
+  std::vector<Descriptor> descriptors;  // one for each feature, in the same order
 
   [[nodiscard]] std::size_t size() const { return features.size(); }
 };
 
 struct FeatureOptions {
   int max_features = 1000;  // 1 or more
-  int cells = 8;            // a side; each cell of the image gets the same share of features
+  int cells = 8;            // along a side; each cell of the image gets the same share of features
   double contrast_threshold = 0.02;  // SIFT's; OpenCV's default is 0.04
   // Least distance of two features. SIFT gives some blobs two orientations; one is kept.
   double least_distance_px = 1.5;
-  // 1, 2 or 4: searches an image with this factor fewer pixels a side. Faster, without the smallest
-  // features.
+  // 1, 2 or 4: the searched image has this factor fewer pixels along a side. Faster, without the
+  // smallest features. Places and scales are those of the whole image.
   int shrink = 1;
 };
 
@@ -60,7 +60,8 @@ class FeatureDetector {
   [[nodiscard]] FeatureSet find(const std::uint8_t* luma, int width, int height,
                                 std::ptrdiff_t stride) const;
 
-  // px; what the installed OpenCV adds to both coordinates: a multiple of a quarter.
+  // px; the shift that the installed OpenCV adds to both coordinates: a multiple of a quarter.
+  // find() subtracts it.
   [[nodiscard]] double opencv_offset_px() const;
 
  private:

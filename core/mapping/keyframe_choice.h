@@ -1,9 +1,9 @@
 #pragma once
-// KeyframeChoice: which pictures of a camera that turns and zooms a map keeps: slow ones, none near
-// another. Distance of two pictures: the largest of |pan| cos(tilt) / field across, |tilt| / field
-// down and |log f| / step, in the steps of the options. A field is what the longer focal length
-// sees. A step of half a field leaves half of the view in common. Pure; allocates where a picture
-// is kept.
+// KeyframeChoice: the pictures of a camera that turns and zooms which a map keeps: slow ones, none
+// near another. The distance of two pictures is the largest of their differences in pan times
+// cos(tilt), in tilt and in log f, each divided by its step. A step of pan or tilt is a share of
+// the field of view at the longer of the two focal lengths; half a field leaves half of the view in
+// common. Pure; allocates when a picture is kept.
 
 #include <algorithm>
 #include <cmath>
@@ -16,11 +16,11 @@ namespace alidade {
 struct KeyframeChoiceOptions {
   double step_fields = 0.35;         // of pan and tilt, in fields of view
   double step_log_f = 0.35;          // of log f
-  double most_motion_px = 10;        // of the image, during the read-out
-  double most_log_f_change = 0.002;  // during the read-out
+  double most_motion_px = 10;        // of the image, during the read-out of all rows
+  double most_log_f_change = 0.002;  // during the read-out of all rows
 
   [[nodiscard]] bool validate(const char** error = nullptr) const {
-    const char* what = nullptr;
+    const char* what = nullptr;  // *error, if not null, is set only when the result is false
     if (!(step_fields > 0 && step_fields <= 1)) what = "step_fields must be above 0 and at most 1";
     if (!(step_log_f > 0)) what = "step_log_f must be above 0";
     if (!(most_motion_px > 0)) what = "most_motion_px must be above 0";
@@ -32,8 +32,8 @@ struct KeyframeChoiceOptions {
 
 // Estimated direction and zoom of a picture.
 struct SeenPlace {
-  PanTilt<double> angle;
-  double log_f = 0;
+  PanTilt<double> angle;  // rad
+  double log_f = 0;       // f in px
 };
 
 class KeyframeChoice {
@@ -47,12 +47,13 @@ class KeyframeChoice {
                              double readout_s) const {
     return haste(log_f, turn_rate, zoom_rate, readout_s) <= 1;
   }
-  // Motion over the limit for a slow picture: above 1 the picture is not slow.
+  // The picture's motion divided by the limit of a slow picture's: above 1 it is not slow.
   [[nodiscard]] double haste(double log_f, double turn_rate, double zoom_rate,
                              double readout_s) const {
     return std::max(std::abs(turn_rate) * std::exp(log_f) * readout_s / options_.most_motion_px,
                     std::abs(zoom_rate) * readout_s / options_.most_log_f_change);
   }
+  // Whether no kept picture is near.
   [[nodiscard]] bool is_new(const SeenPlace& place) const {
     return std::all_of(kept_.begin(), kept_.end(),
                        [&](const SeenPlace& other) { return apart(place, other) >= 1; });

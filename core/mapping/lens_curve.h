@@ -1,11 +1,11 @@
 #pragma once
-// LensCurve: a lens over its range of focal lengths, with s = log f (px) by the zoom reading, from
-// a data sheet or an earlier calibration. x(s) = (delta, kappa, c_u, c_v) is a cubic B-spline.
+// LensCurve: a lens over its range of focal lengths. s is log f (px) as a data sheet or an earlier
+// calibration gives it for the zoom reading. x(s) = (delta, kappa, c_u, c_v) is a cubic B-spline.
 //   log f = s + delta(s) + eps                        eps: how the lens came to rest this time
 //   kappa: distortion in the corner (core/model/lens/zoom_law.h) at log f = s + delta(s)
 //   c: optical centre from the image's middle, px
-// Under eps, hold = 1 keeps kappa, hold = 0 keeps the distortion's terms. Beyond the ends x is
-// constant. Linear in the control points. The constructor allocates.
+// Where eps changes f, hold = 1 keeps kappa and hold = 0 keeps the distortion's terms. Beyond the
+// ends x is constant. x is linear in the control points. Only constructors allocate.
 
 #include <algorithm>
 #include <cmath>
@@ -23,12 +23,12 @@ using LensQuantities = ZoomQuantities<double>;
 
 class LensCurve : public CubicSpline<kLensQuantityCount, LensCurve> {
  public:
-  static constexpr double kUnknownHold = 0.5;
+  static constexpr double kUnknownHold = 0.5;  // if nothing is known of hold
 
   LensCurve() = default;
 
-  // Over log f from first to last, in segments of at most `spacing`. Each control point: delta 0,
-  // kappa and centre of `camera`.
+  // Over s from first to last (last > first), in segments of at most `spacing` (> 0), all log f.
+  // Each control point has delta 0 and the camera's kappa and centre.
   LensCurve(const Camera<double>& camera, double first, double last, double spacing)
       : CubicSpline(even_knots(first, last, spacing)),
         width_(camera.width),
@@ -39,17 +39,18 @@ class LensCurve : public CubicSpline<kLensQuantityCount, LensCurve> {
     for (int i = 0; i < control_points(); ++i) control_point(i) = x;
   }
 
-  // All quantities 0, to be filled in: for stored knots and control points. Two knots or more,
-  // increasing.
+  // All quantities are 0, to be filled in: for stored knots and control points. knots: log f, two
+  // or more, increasing.
   LensCurve(int width, int height, double aspect, const std::vector<double>& knots)
       : CubicSpline(knots), width_(width), height_(height), aspect_(aspect) {}
 
-  // A lens that does not zoom; f may differ nevertheless.
+  // A lens that does not zoom; eps may still change f.
   [[nodiscard]] static LensCurve of(const Camera<double>& camera) {
     const double log_f = std::log(camera.focal_length);
     return {camera, log_f - 0.01, log_f + 0.01, 1};
   }
 
+  // px, but for the aspect.
   [[nodiscard]] int width() const { return width_; }
   [[nodiscard]] int height() const { return height_; }
   [[nodiscard]] double aspect() const { return aspect_; }
@@ -101,7 +102,8 @@ class LensCurve : public CubicSpline<kLensQuantityCount, LensCurve> {
     return camera(s, value(basis_at(s)), eps, hold_);
   }
 
-  // The camera of a focal length, whatever its zoom reading. J_camera_log: d camera / d log f.
+  // The camera with this focal length, when the zoom reading is not known: eps is 0 within the
+  // curve's range. J_camera_log: d camera / d log f.
   [[nodiscard]] Camera<double> camera_of(double log_f,
                                          CameraColumn<double>* J_camera_log = nullptr) const {
     // Fixed-point iteration; converges as delta changes slowly.

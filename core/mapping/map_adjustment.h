@@ -4,9 +4,9 @@
 // (lens_curve.h).
 //   sum rho(|u_ij - project(R_i, lens(s_i, eps_i), d_j)|^2 / sigma_ij^2)             rho: Huber's
 // + |Log(Rp_i^T R_i)|^2 by cov_p, with telemetry Rp  + (eps_i / sigma_eps_i)^2 + priors of the lens
-// Pictures must connect, else the groups are named. Without telemetry the first picture's
-// orientation is kept. Equal input gives equal results on one thread. Allocates: the covariance
-// takes (4 pictures + lens)^2 numbers. Method: docs/derivations.md.
+// All pictures must be connected by landmarks, else the result names the groups. If no picture has
+// telemetry, the first picture's orientation is kept. Equal input gives equal results on one
+// thread. Allocates (4 pictures + lens)^2 numbers of covariance. Method: docs/derivations.md.
 
 #include <Eigen/Core>
 #include <optional>
@@ -33,15 +33,15 @@ struct MapPicture {
 };
 
 struct MapObservation {
-  int picture = 0;
-  int landmark = 0;
+  int picture = 0;        // index into MapEvidence::pictures
+  int landmark = 0;       // index, below MapEvidence::landmarks
   Vector2<double> u;      // px
   double sigma_px = 0.2;  // of each coordinate; > 0
 };
 
 struct MapEvidence {
   std::vector<MapPicture> pictures;
-  int landmarks = 0;
+  int landmarks = 0;  // their number
   std::vector<MapObservation> observations;
 };
 
@@ -55,9 +55,10 @@ struct MapOptions {
   LensQuantities level_sigma{0.05, 0.1, 30, 30};
   LensQuantities bend_sigma{0.02, 0.02, 3, 3};
   double hold_sigma = 0.5;  // of the lens's hold, about the hold of `lens`
-  // rad; a start direction farther than this from its landmark's others is not used.
+  // rad; an observation whose direction at the start lies farther than this from those of its
+  // landmark's other observations is not used.
   double most_start_error = 0.1;
-  double gate_sigmas = 4;  // times the noise that was found
+  double gate_sigmas = 4;  // of an observation that is kept; times the noise that was found
   int least_common = 8;    // landmarks in common that connect two pictures
   int max_steps = 100;     // of each round
   int threads = 1;
@@ -74,21 +75,21 @@ enum class MapStatus {
 [[nodiscard]] const char* to_string(MapStatus status);
 
 struct AdjustedPicture {
-  Matrix3<double> R_base_from_camera = Matrix3<double>::Identity();
-  double eps = 0;
+  Matrix3<double> R_base_from_camera = Matrix3<double>::Identity();  // at the reference row
+  double eps = 0;                                                    // of log f
   Camera<double> camera;
 };
 
 // Other members than status, groups and steps only with kOk.
 struct MapAdjustment {
   MapStatus status = MapStatus::kBadInput;
-  // Groups of connected pictures, the largest first; a single one with kOk.
+  // Groups of connected pictures (indices), the largest first; a single one with kOk.
   std::vector<std::vector<int>> groups;
   std::vector<AdjustedPicture> pictures;
   LensCurve lens;
-  // Base; of zero length if fewer than two observations are left.
+  // Unit directions in base; of zero length if fewer than two observations are left.
   std::vector<Vector3<double>> landmarks;
-  std::vector<int> left_out;   // observations, in increasing order
+  std::vector<int> left_out;   // indices of observations, increasing
   Eigen::MatrixXd covariance;  // of (xi, log f) of each picture, 4 rows each
   double hold_sigma = 0;       // of the lens's hold
   double noise_scale = 0;      // rms of the residuals in their sigmas

@@ -3,10 +3,10 @@
 // order: links between pairs of pictures (picture_links.h), a first adjustment with some features
 // and the prior lens (map_adjustment.h), a second one with all features, landmarks (map_making.h).
 // Details: docs/derivations.md.
-// Pictures without telemetry are tied to the others by common features. Without any telemetry the
-// base is that of one picture, which looks forward. Parts that do not connect to the rest are
-// named: small ones are left out, larger ones refused.
-// Batch work: allocates much. Equal input gives equal maps. No threads of its own.
+// Pictures without telemetry are tied to the others by common features. If no picture has
+// telemetry, one picture defines the base: it looks forward. Parts of the map without connection to
+// the rest are named in the result: small parts are left out, a larger one refuses the map. Batch
+// work: allocates much. Equal input gives equal maps. No threads of its own.
 
 #include <cstdint>
 #include <functional>
@@ -22,26 +22,26 @@ namespace alidade {
 
 // Knowledge of a picture besides its features.
 struct MapView {
-  std::string recording;
-  std::int64_t frame = 0;
-  double time_utc_s = 0;
-  std::optional<double> zoom;
-  // From zoom reading and data sheet or calibration; either all pictures have it or none has.
+  std::string recording;       // name
+  std::int64_t frame = 0;      // of the recording
+  double time_utc_s = 0;       // 0: not known
+  std::optional<double> zoom;  // reading, device units
+  // f in px, from zoom reading and data sheet or calibration; all pictures have it, or none has.
   std::optional<double> log_f;
-  std::optional<PanTilt<double>> telemetry;  // measured angles
-  // rad, of telemetry's orientation: noise, backlash, uncertainty of the axes.
+  std::optional<PanTilt<double>> telemetry;  // measured angles, rad
+  // Sigma of the orientation by telemetry, rad: noise, backlash, uncertainty of the axes.
   double angle_sigma = 1e-3;
   Vector3<double> angular_velocity = Vector3<double>::Zero();  // camera frame, rad/s
   double zoom_rate = 0;                                        // d log f / dt, 1/s
 };
 
 struct MapBuildOptions {
-  int width = 0;  // px, of all pictures
-  int height = 0;
-  double line_delay = 0;  // s/row
-  std::optional<Mechanics<double>> mechanics;
+  int width = 0;                               // px, of all pictures
+  int height = 0;                              // px, of all pictures
+  double line_delay = 0;                       // s/row
+  std::optional<Mechanics<double>> mechanics;  // empty: not known; telemetry is not used
   std::optional<LensCurve> lens;  // of an earlier calibration; its range must contain all log_f
-  // Of log_f: error of the data sheet at a picture before the adjustment.
+  // Sigma of log_f before the adjustment: error of the data sheet.
   double log_f_sigma = 0.02;
   double repeatability = 1e-3;  // sigma of log f after a movement of the zoom
   double lens_spacing = 0.4;    // of log f, between knots of the lens's curve
@@ -54,9 +54,9 @@ struct MapBuildOptions {
   double gate_px = 1.5;
   double gate_sigmas = 6;
   int least_features = 30;  // of a usable picture
-  // The map is refused if an unconnected part has this many pictures.
+  // The map is refused if an unconnected part has this many pictures or more.
   int least_group = 3;
-  bool largest_part = false;  // use the largest part even then
+  bool largest_part = false;  // the largest part is used even then
 
   [[nodiscard]] bool validate(const char** error = nullptr) const;
 };
@@ -65,40 +65,40 @@ enum class MapBuildStatus {
   kOk,
   kBadInput,       // options, or too few pictures
   kNoTexture,      // fewer than two pictures with enough features
-  kNoFocalLength,  // only some pictures have log_f, or none fits
+  kNoFocalLength,  // only some pictures have log_f; or none has it and no focal length fits
   kNotConnected,   // see MapBuild::groups
   kNotDetermined,  // the adjustment found no minimum
 };
 
 [[nodiscard]] const char* to_string(MapBuildStatus status);
 
+// Pictures are indices in the order of add().
 struct MapBuild {
-  // Filled with kOk.
   MapBuildStatus status = MapBuildStatus::kBadInput;
-  SceneMap map;
-  std::vector<int> of_keyframe;          // index of each keyframe's picture, in the order of add()
-  std::vector<int> without_texture;      // left out
-  std::vector<int> not_connected;        // left out
-  std::vector<std::vector<int>> groups;  // with kNotConnected; the largest first
+  SceneMap map;                          // with kOk
+  std::vector<int> of_keyframe;          // picture of each keyframe; with kOk
+  std::vector<int> without_texture;      // pictures that were left out
+  std::vector<int> not_connected;        // likewise
+  std::vector<std::vector<int>> groups;  // with kNotConnected: of pictures, the largest first
   MapStatus adjustment = MapStatus::kOk;
   int compared = 0;  // pairs of pictures
-  int linked = 0;
+  int linked = 0;    // pairs that a rotation and a change of f explain
   int tracks = 0;
   int observations = 0;    // used by the map
   double residual_px = 0;  // rms of an observation's error
-  double noise_scale = 0;  // residuals over stated noise
+  double noise_scale = 0;  // rms of the residuals in their sigmas
   double hold_sigma = 0;   // of the map's lens
-  int steps = 0;
+  int steps = 0;           // of the adjustment
 };
 
-// done: 0 to 1. what: the current step.
+// done: 0 to 1. what: the current step, in words.
 using MapProgress = std::function<void(double done, const char* what)>;
 
 class MapBuilder {
  public:
   explicit MapBuilder(const MapBuildOptions& options) : options_(options) {}
 
-  // picture: coded, as the map keeps it; may be empty.
+  // picture: coded, to be kept in the map; may be empty.
   void add(MapView view, FeatureSet features, std::vector<std::uint8_t> picture = {});
   [[nodiscard]] int size() const { return static_cast<int>(views_.size()); }
   [[nodiscard]] const MapView& view(int i) const { return views_[static_cast<std::size_t>(i)]; }

@@ -1,9 +1,9 @@
 #pragma once
-// make_scene_map(): turns an adjustment into a scene map: its keyframes, and landmarks with
+// make_scene_map(): turns an adjustment into a scene map: keyframes, and landmarks with
 // covariances. A landmark is a track with two or more observations that the adjustment kept, or a
-// feature that only one picture has seen. Its own covariance comes from its observations, in
-// tangent_basis(d_b). The common one comes from pose and f of the keyframe in which its direction
-// is known best. Base frame, rad and px. Batch work: allocates.
+// feature that only one picture has seen. A landmark's own covariance comes from its observations,
+// in tangent_basis(d_b). Its common covariance comes from pose and f of the keyframe in which its
+// direction is known best. Base frame, rad and px. Batch work: allocates.
 
 #include <optional>
 #include <vector>
@@ -14,8 +14,8 @@
 
 namespace alidade {
 
-// Pictures are indexed as in found. The observations of evidence are the features of the tracks, in
-// sequence.
+// Borrowed for the call. Pictures are indexed as in `found`. The observations of `evidence` are the
+// features of the tracks, track by track.
 struct MapMaterial {
   const MapBuildOptions& options;
   const MapAdjustment& found;
@@ -26,11 +26,11 @@ struct MapMaterial {
   std::vector<const LinkedPicture*> pictures;
 };
 
-// Norm of each observation's residual, px; empty if it was left out.
+// Norm of each observation's residual, px; empty if the observation was left out.
 [[nodiscard]] std::vector<std::optional<double>> errors_px(const MapEvidence& evidence,
                                                            const MapAdjustment& found);
 
-// Fills in the map, the numbers of its tracks and observations, and its residuals.
+// Sets out->map, the counts of its tracks and observations, and its residuals.
 void make_scene_map(const MapMaterial& material, MapBuild* out);
 
 }  // namespace alidade

@@ -1,9 +1,9 @@
 #pragma once
 // Pairs of pictures: which are worth comparing, their matches, and whether a rotation and a change
-// of f explain these. Pictures are compared if they see the same by telemetry and zoom or, without
-// telemetry, if retrieval over all features suggests them. A link is checked as the pose of one
-// picture in the other's frame (picture_pose.h). The lens need not be known yet: the threshold
-// allows for its distortion. Batch work: allocates. Pure.
+// of f explain the matches. Two pictures are compared if they see the same place by telemetry and
+// zoom; without telemetry, if retrieval over all features suggests it. A link is checked as the
+// pose of one picture in the other's frame (picture_pose.h). The lens need not be known yet: the
+// threshold allows for its distortion. Batch work: allocates. Pure.
 
 #include <optional>
 #include <utility>
@@ -20,21 +20,21 @@ namespace alidade {
 struct LinkedPicture {
   FeatureSet features;
   PictureMotion motion;
-  double log_f = 0;
+  double log_f = 0;  // f in px
   double log_f_sigma = 0.05;
   std::optional<Matrix3<double>> R_base_from_camera;  // from telemetry
   double R_sigma = 0;                                 // rad
 };
 
 struct LinkOptions {
-  double ratio = 0.8;
+  double ratio = 0.8;              // as MatchOptions::ratio
   int most_partners = 12;          // of each picture
   double most_log_f_off = 1.2;     // of two pictures; beyond, few features have a size seen in both
   double threshold_share = 0.008;  // of the image's width; how far distortion may move a match
-  int least_inliers = 12;
+  int least_inliers = 12;          // of a link
 };
 
-// Increasing pairs (a, b), a < b.
+// Indices (a, b), a < b, in increasing order. width, height: px.
 [[nodiscard]] std::vector<std::pair<int, int>> pairs_to_compare(
     const std::vector<LinkedPicture>& pictures, int width, int height, const LinkOptions& options);
 
@@ -51,20 +51,20 @@ struct PictureLink {
 [[nodiscard]] PictureLink match_pair(const std::vector<LinkedPicture>& pictures, int a, int b,
                                      const LinkOptions& options);
 
-// Sets status, inliers and R_a_from_b. lens: distortion and centre.
+// Sets status, inliers and R_a_from_b of a link with matches. lens: gives distortion and centre.
 void check_link(const std::vector<LinkedPicture>& pictures, const LensCurve& lens,
                 const LinkOptions& options, PictureLink* link);
 
 // The common focal length (log f) with which most matches of these links fit, for pictures of one
-// lens that did not zoom. Nothing if no link fits.
+// lens that did not zoom. Empty if no link fits.
 [[nodiscard]] std::optional<double> common_focal_length(const std::vector<LinkedPicture>& pictures,
                                                         const std::vector<PictureLink>& links,
                                                         int width, int height,
                                                         const LinkOptions& options);
 
-// Start values of R_base_from_camera: from telemetry, and along the strongest links from there.
-// Without telemetry from the picture with most links, which looks forward. Nothing for pictures
-// that are not connected.
+// Start values of R_base_from_camera, by picture: from telemetry, and from there along the
+// strongest links. If no picture has telemetry, the picture with most links looks forward and is
+// the beginning. Empty for pictures that are not connected to a beginning.
 [[nodiscard]] std::vector<std::optional<Matrix3<double>>> start_orientations(
     const std::vector<LinkedPicture>& pictures, const std::vector<PictureLink>& links);
 

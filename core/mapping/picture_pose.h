@@ -2,8 +2,8 @@
 // find_pose(): where a picture looks, and with which f, from matches of its features with
 // directions of the map. Unknowns: R_base_from_camera at the reference row, and log f. With a mount
 // only pan and tilt turn the camera (mechanics.h); without, the rotation is free. The motion during
-// the read-out (map_projection.h) is known, or estimated with a prior, which is possible as the
-// rows are exposed one after another.
+// the read-out (map_projection.h) is known, or is estimated with a prior: the picture shows it, as
+// its rows are exposed one after another.
 // The covariance grows if residuals exceed their sigmas. Refuses what could be wrong, see
 // PoseStatus. Equal input gives equal results. Allocates; no shared state. Method:
 // docs/derivations.md.
@@ -28,12 +28,13 @@ struct PoseMatch {
 };
 
 struct FocalLengthPrior {
-  double log_f = 0;
+  double log_f = 0;  // f in px
   double sigma = 0;  // > 0
 };
 
-// Uncertainty of a motion: sigmas of what it does over the image's height. 0: known. Infinity:
-// unknown; it is then limited to some image widths a second, faster than any camera.
+// Uncertainty of a motion: sigmas of the change during the read-out of all rows. 0: known.
+// Infinity: unknown; the motion is then limited to some image widths a second, faster than any
+// camera.
 struct MotionDoubt {
   double turn = 0;   // rad, of each of the mount's axes
   double log_f = 0;  // of log f's change
@@ -46,27 +47,27 @@ struct PoseKnowledge {
   LensCurve lens;
   PictureMotion motion;  // the mean; with a line delay of 0 a camera at rest
   MotionDoubt motion_doubt;
-  std::optional<PictureMotion> motion_start;  // start of the search, as in PicturePose
-  // A mount that turns the camera during the read-out. Without it `mechanics`, or any axis.
+  std::optional<PictureMotion> motion_start;  // start of the search, as PicturePose::motion
+  // A mount that turns the camera during the read-out. Empty: `mechanics`, or any axis.
   std::optional<Mechanics<double>> turned_by;
-  std::optional<Mechanics<double>> mechanics;  // none: the rotation is free
+  std::optional<Mechanics<double>> mechanics;  // empty: the rotation is free
   std::optional<FocalLengthPrior> focal_length;
-  double least_log_f = 0;  // range of f
+  double least_log_f = 0;  // range of log f (px)
   double most_log_f = 20;
 };
 
 struct PoseOptions {
-  int max_trials = 2000;    // pairs of matches
+  int max_trials = 2000;    // number of pairs of matches that are tried
   double threshold_px = 3;  // of an inlier of a pose from two matches
   // Of an inlier of the adjusted pose, in its sigmas times the noise that was found.
   double gate_sigmas = 4;
   double roll_tolerance = 0.05;  // rad; error of the mount's roll due to the noise of two matches
   int least_inliers = 8;
   double least_spread = 0.03;  // rms of the inliers along their narrow side, over the image's width
-  // log10 of the expected number of poses with as many inliers by chance.
+  // Limit of log10 of the expected number of poses with as many inliers by chance.
   double most_chance_log10 = -6;
-  // Another pose is a rival if it has this share of the number of inliers, among the remaining
-  // matches.
+  // Another pose is a rival if it has this share of the pose's number of inliers, among the matches
+  // that are not inliers of the pose.
   double rival_share = 0.5;
   std::uint64_t seed = 1;
 };
@@ -75,9 +76,9 @@ enum class PoseStatus {
   kOk,
   kTooFewMatches,  // fewer than least_inliers
   kNoPose,         // no pair of matches gives a pose with least_inliers
-  kByChance,       // as many matches would agree by chance
+  kByChance,       // chance makes as many matches agree, see most_chance_log10
   kOneSpot,        // the inliers lie in one spot
-  kCollinear,      // or nearly on one line
+  kCollinear,      // the inliers lie nearly on one line
   kRival,          // repeated texture: another pose explains nearly as much
   kNotDetermined,  // the adjustment has no minimum
   kTooFast,        // the estimated motion is faster than heads turn and than the model holds
@@ -93,18 +94,19 @@ struct PicturePose {
   // Of xi in R Exp(xi) (camera frame, rad) and log f.
   Matrix4<double> covariance = Matrix4<double>::Zero();
   Camera<double> camera;                 // of log_f
-  std::optional<PanTilt<double>> angle;  // true angles, with a mount
-  // The known motion; if it was estimated: in heights (map_projection.h).
+  std::optional<PanTilt<double>> angle;  // true angles, rad; with a mount
+  // The known motion; if it was estimated, in heights (picture_motion.h).
   PictureMotion motion;
-  // Of w and zoom rate of motion; 0 if it was known.
+  // Of w and zoom rate of `motion`; 0 if the motion was known.
   Matrix4<double> motion_covariance = Matrix4<double>::Zero();
   std::vector<int> inliers;  // indices of matches, increasing
   double noise_scale = 0;    // rms of the residuals in their sigmas
   double chance_log10 = 0;   // see most_chance_log10
-  int trials = 0;
+  int trials = 0;            // pairs of matches that were tried
 };
 
-// px; one sigma of the shift of the first or last row's pixels by the uncertain motion.
+// px; one sigma of the shift of the first or last row's pixels by the uncertain motion. log_f: of
+// the picture.
 [[nodiscard]] double motion_reach_px(const PoseKnowledge& knowledge, double log_f);
 
 [[nodiscard]] PicturePose find_pose(const std::vector<PoseMatch>& matches,

@@ -1,7 +1,7 @@
 #pragma once
 // PlaceNoise: sigma of a feature's place by its size, as large features are less sharp. It starts
-// with a guess and learns from an adjustment's residuals: for each bin of sizes, the median of the
-// errors' norms over that of two standard normal numbers.
+// with a guess and learns from an adjustment's residuals. For each bin of sizes sigma is the median
+// of the errors' norms, divided by the median norm of two standard normal numbers.
 
 #include <algorithm>
 #include <array>
@@ -22,7 +22,7 @@ class PlaceNoise {
     }
   }
 
-  // px; of each coordinate of a feature of that size.
+  // px; of each coordinate of a feature of this size (sigma of the blob, px).
   [[nodiscard]] double sigma_px(double scale_px) const { return sigma_[bin(scale_px)]; }
 
   // scale_and_error: size of the feature and norm of the error, px. A bin with fewer than 100 is

@@ -1,7 +1,7 @@
 #pragma once
 // SceneMap: a finished map as plain data, to be adjusted, stored, localized against and kept up.
-//   keyframe   a picture that stays: where it looked at its reference row, with which f, and its
-//              origin. log f = s + delta(s) + eps (lens_curve.h), s its position.
+//   keyframe   a picture that stays in the map: where it looked at the reference row, with which f,
+//              and its origin. log f = s + delta(s) + eps (lens_curve.h), s its position.
 //   landmark   a thing that can be recognised: direction in base, appearance, size, history
 //   sighting   where a keyframe sees a landmark
 // Ids increase and are never reused. Times are UTC seconds since 1970. Only the vectors allocate.
@@ -22,15 +22,15 @@
 namespace alidade {
 
 struct SceneKeyframe {
-  std::int64_t id = 0;  // 1 or more
-  std::string recording;
-  std::int64_t frame = 0;  // of the recording, from 0
-  double time_utc_s = 0;
+  std::int64_t id = 0;                       // 1 or more
+  std::string recording;                     // name, at most kMostNameBytes
+  std::int64_t frame = 0;                    // of the recording, from 0
+  double time_utc_s = 0;                     // 0: not known
   std::optional<double> zoom;                // reading, in the lens's own unit
   double position = 0;                       // s: log f by the zoom reading
-  std::optional<PanTilt<double>> telemetry;  // measured angles
+  std::optional<PanTilt<double>> telemetry;  // measured angles, rad
   Eigen::Quaterniond R_base_from_camera = Eigen::Quaterniond::Identity();
-  double eps = 0;
+  double eps = 0;                                              // of log f
   Matrix4<double> covariance = Matrix4<double>::Zero();        // of xi in R Exp(xi) (rad) and log f
   Vector3<double> angular_velocity = Vector3<double>::Zero();  // camera frame, rad/s
   double zoom_rate = 0;                                        // d log f / dt, 1/s
@@ -49,30 +49,32 @@ struct LandmarkLife {
   double last_seen_utc_s = 0;
   std::uint32_t looked_for = 0;  // views in which it should have been found
   std::uint32_t matched = 0;     // views in which it was found
-  std::uint32_t missed = 0;      // consecutive ones up to the latest look; 0 if it was found then
+  std::uint32_t missed = 0;      // consecutive views without it, up to the latest; 0: found there
 };
 
 struct SceneLandmark {
-  std::int64_t id = 0;  // 1 or more
-  Vector3<double> d_b = Vector3<double>::UnitX();
-  // rad^2, in tangent_basis(d_b). The error of d_b has an own part, independent of other landmarks,
-  // and a part common with its neighbours, which a pose found from these cannot show: as if the
-  // base were turned. The whole is their sum. Poses are computed with the own parts; the common one
-  // is added to the pose.
+  std::int64_t id = 0;                             // 1 or more
+  Vector3<double> d_b = Vector3<double>::UnitX();  // unit direction
+  // rad^2, in tangent_basis(d_b). The error of d_b is the sum of two parts: an own one, independent
+  // of other landmarks, and a part common with the neighbours. A pose found from the neighbours
+  // cannot show the common part: it looks as if the base were turned. Poses are computed with the
+  // own parts; the common part is added to the pose's covariance.
   Matrix2<double> covariance = Matrix2<double>::Zero();         // own part
   Matrix2<double> shared_covariance = Matrix2<double>::Zero();  // common part
   double scale_rad = 0;        // sigma of the blob as an angle; > 0
-  double focal_length_px = 0;  // at which it was seen
+  double focal_length_px = 0;  // with which its size was measured
   Descriptor descriptor{};
   LandmarkLife life;
-  // By increasing keyframe, one each. Landmarks born later have none.
+  // By increasing keyframe id, one for each keyframe. Landmarks born after the map was built have
+  // none.
   std::vector<SceneSighting> sightings;
 
   [[nodiscard]] Matrix2<double> whole_covariance() const { return covariance + shared_covariance; }
 };
 
 struct SceneMap {
-  // Upper limits. With pictures they exceed a board's memory, see scene_map_file.h.
+  // Upper limits of a valid map. With pictures a map of this size exceeds a board's memory, see
+  // scene_map_file.h.
   static constexpr std::size_t kMostKeyframes = 100'000;
   static constexpr std::size_t kMostLandmarks = 1'000'000;
   static constexpr std::size_t kMostSightings = 10'000'000;
@@ -81,13 +83,13 @@ struct SceneMap {
   static constexpr int kMostImageSide = 16384;                             // px
   static constexpr int kMostLensPoints = 1000;
 
-  LensCurve lens;            // includes the image's size
-  double line_delay = 0;     // s/row, any sign
-  double reference_row = 0;  // px
-  std::optional<Mechanics<double>> mechanics;
-  std::vector<SceneKeyframe> keyframes;
-  std::vector<SceneLandmark> landmarks;
-  std::int64_t next_landmark = 1;  // id; above all ids ever used
+  LensCurve lens;                              // includes the image's size
+  double line_delay = 0;                       // s/row, any sign
+  double reference_row = 0;                    // px
+  std::optional<Mechanics<double>> mechanics;  // empty: not known
+  std::vector<SceneKeyframe> keyframes;        // by increasing id
+  std::vector<SceneLandmark> landmarks;        // by increasing id
+  std::int64_t next_landmark = 1;              // id; above all ids ever used
 
   [[nodiscard]] PictureMotion motion_of(const SceneKeyframe& keyframe) const {
     return {keyframe.angular_velocity, keyframe.zoom_rate, line_delay, reference_row};
@@ -101,9 +103,10 @@ struct SceneMap {
 [[nodiscard]] std::ptrdiff_t keyframe_index(const SceneMap& map, std::int64_t id);
 [[nodiscard]] std::ptrdiff_t landmark_index(const SceneMap& map, std::int64_t id);
 
-// Whether every number is possible and every id exists. *error: one line that names what is not.
+// Whether every number is possible and every id exists. *error (may be null): one line that names
+// the first fault.
 [[nodiscard]] bool is_valid(const SceneMap& map, std::string* error = nullptr);
-// The same for one part of any map. Does not look up a sighting's keyframe.
+// The same for one part of any map. Whether a sighting's keyframe exists is not checked.
 [[nodiscard]] bool is_valid(const SceneKeyframe& keyframe, std::string* error = nullptr);
 [[nodiscard]] bool is_valid(const SceneLandmark& landmark, std::string* error = nullptr);
 

@@ -3,9 +3,9 @@
 // is shown each picture whose pose was found from the map, and returns a change of the map:
 // landmarks that were seen (landmark_filter.h, descriptors by a running average), born or dead.
 // Bounded: the sphere is divided into cells, in proportion to the landmarks' size, and each cell
-// holds a limited number. In a full cell or map a new landmark replaces the least useful one if
-// that is worth less. The candidates kept beside the map are bounded, too; losing them at the end
-// does no harm.
+// holds a limited number of landmarks. In a full cell or map a new landmark replaces the least
+// useful landmark if the new one is worth more. The number of candidates, which are kept beside the
+// map, is bounded too; losing the candidates at the end does no harm.
 // Equal pictures give equal changes. Allocates; one thread at a time. Rules: docs/derivations.md.
 
 #include <cstdint>
@@ -20,32 +20,35 @@ namespace alidade {
 struct SceneMapUpkeepOptions {
   // Detection
   double sigma_px = 0.2;  // px; of a feature of scale 1.6 px, each coordinate; grows with the scale
-  // Least sigma of a landmark's own direction at the focal length it was seen with. More pictures
-  // do not improve on it.
+  // Least sigma of a landmark's own direction, at the focal length with which it was seen. More
+  // pictures do not make it smaller.
   double least_sigma_px = 0.03;
-  double gate_sigmas = 4;
+  double gate_sigmas = 4;         // largest innovation of a match, in its sigmas
   double wander_of_scale = 0.01;  // of a landmark, in its sizes per day: leaves, shadows, warmth
-  double lasting_s = 600;         // > 0; how long a feature's error lasts, as the light does
+  double lasting_s = 600;         // > 0; how long a feature's error lasts: as long as the light
   // Appearance
-  double forgetting = 0.1;  // weight of a new descriptor
+  double forgetting = 0.1;  // weight of a new descriptor in the average, 0 to 1
   // Birth
-  int birth_views = 20;            // consecutive ones in which it must be seen
-  double least_proximity = 0.6;    // 0 to 1; 0: no check
+  int birth_views = 20;  // consecutive pictures in which a new landmark must be seen
+  // A new landmark must lie near the matched features: the area of the box around these over the
+  // area of the box that also holds the new one, 0 to 1. 0: no check.
+  double least_proximity = 0.6;
   double birth_gate_px = 2;        // of the place, from one picture to the next
   int most_descriptor_step = 150;  // distance of descriptors (of 512) from one picture to the next
   int most_candidates = 2000;
   // Death
-  double patience_s = 2.5 * 86400;
-  int least_misses = 20;
-  // Share found of what was found the last time; below it the scene is taken to be hidden.
+  double patience_s = 2.5 * 86400;  // time without being seen after which a landmark dies
+  int least_misses = 20;            // consecutive misses that its death needs, too
+  // If less is found than this share of the usual number, the scene is taken to be hidden, and no
+  // misses are counted. Only landmarks that were found in their latest look count.
   double fog_share = 0.5;
   double longest_fog_s = 5 * 86400;  // a landmark not seen for longer is gone, not hidden
   // Bounds
-  double cell_scales = 20;  // side of a cell, in scales of its octave
-  int cell_capacity = 3;
-  int most_landmarks = 100'000;
-  // What should be found: scale in the picture, zoom against the one it was seen with, distance
-  // from the border.
+  double cell_scales = 20;       // side of a cell, in scales of its octave
+  int cell_capacity = 3;         // landmarks
+  int most_landmarks = 100'000;  // of the map
+  // A landmark should be found if its scale in the picture, the ratio of the focal length to the
+  // one with which it was seen, and its distance from the border lie within these limits.
   double least_scale_px = 1.6;
   double most_scale_px = 100;
   double most_zoom_ratio = 2;
@@ -64,18 +67,18 @@ struct UpkeepMatch {
 // with cov_d = covariance).
 struct UpkeepView {
   double time_utc_s = 0;
-  Matrix3<double> R_base_from_camera = Matrix3<double>::Identity();
-  double log_f = 0;
+  Matrix3<double> R_base_from_camera = Matrix3<double>::Identity();  // at the reference row
+  double log_f = 0;                                                  // f in px
   Matrix4<double> covariance = Matrix4<double>::Zero();  // of (xi, log f), against the landmarks
   PictureMotion motion;
-  const FeatureSet* features = nullptr;
-  // Matches that gave the pose; each feature and each landmark once.
+  const FeatureSet* features = nullptr;  // borrowed for the call
+  // Matches that gave the pose; each feature and each landmark at most once.
   std::vector<UpkeepMatch> matches;
 };
 
 struct UpkeepCounts {
   int expected = 0;  // landmarks that should be found in this picture
-  int updated = 0;
+  int updated = 0;   // matched landmarks that were moved
   int beyond_gate = 0;
   int born = 0;
   int died = 0;
@@ -90,7 +93,7 @@ class SceneMapUpkeep {
   explicit SceneMapUpkeep(const SceneMapUpkeepOptions& options = {})
       : options_(options), valid_(options.validate()) {}
 
-  // The change of the map by a picture; apply() it before the next one.
+  // The change of the map by a picture; apply() it before the next call. counts: may be null.
   [[nodiscard]] MapChange show(const UpkeepView& view, const SceneMap& map,
                                UpkeepCounts* counts = nullptr);
 
@@ -119,12 +122,13 @@ class SceneMapUpkeep {
   std::vector<Candidate> candidates_;
 };
 
-// How much a landmark is worth keeping, 0 to 1: the share of looks that found it, less if that was
-// long ago.
+// How much a landmark is worth keeping, 0 to 1: the share of looks that found it, less if it was
+// last seen long ago.
 [[nodiscard]] double worth_of(const SceneLandmark& landmark, double now_utc_s, double patience_s);
 
-// (1 - weight) average + weight seen, scaled to the same length. `salt` decides at random whether
-// to round up or down, so that a difference below one step is not lost for ever.
+// *average becomes (1 - weight) average + weight seen, scaled to a descriptor's length. weight: 0
+// to 1. `salt` decides at random whether to round up or down, so that a difference below one step
+// is not lost for ever.
 void average_descriptor(const Descriptor& seen, double weight, std::uint64_t salt,
                         Descriptor* average);
 

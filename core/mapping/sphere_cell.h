@@ -1,7 +1,7 @@
 #pragma once
 // Cells of about equal size on the unit sphere: rings of constant latitude, each divided into as
-// many cells as it has room for. Things with scales in an octave [2^o, 2^(o+1)) rad have cells of
-// `scales` 2^o rad. Pure.
+// many cells as it has room for. Landmarks with scales in an octave [2^o, 2^(o+1)) rad have cells
+// with a side of `scales` times 2^o rad. Pure.
 
 #include <algorithm>
 #include <cmath>
@@ -12,8 +12,8 @@
 
 namespace alidade {
 
-// The cell's number: the same for equal octave and cell only. d: unit length. scale_rad: 2^-60 to
-// 1.
+// The cell's number; two directions have the same number only if octave and cell are equal. d: unit
+// length. scale_rad: 2^-60 to 1.
 [[nodiscard]] inline std::uint64_t sphere_cell(const Vector3<double>& d, double scale_rad,
                                                double scales) {
   const int octave = std::clamp(std::ilogb(scale_rad), -60, 0);

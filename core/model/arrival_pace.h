@@ -2,9 +2,9 @@
 // ArrivalPace: detects whether a stream's items come at their sender's pace or are a backlog.
 //   receive_i - sender_i = constant + delay_i + age_i
 // After a stall (a relay, a network or a process that stood still) items wait and then come faster
-// than they were sent. receive - sender falls until the last waiting item is here. Nobody knows
-// while it falls where it will end, so an item's age is unknown. A stream that is late by a
-// constant cannot be told from a network with that delay.
+// than they were sent: receive - sender falls until the last waiting item has come. During the fall
+// nobody knows where it will end, so an item's age is unknown. A stream that is late by a constant
+// cannot be told from a network with the same delay.
 // Fixed memory, trivially copyable, no allocation, no exceptions; one thread. All times are
 // seconds.
 
@@ -34,7 +34,8 @@ class ArrivalPace {
     greatest_s_ = -std::numeric_limits<double>::infinity();
   }
 
-  // Values must be finite. An overtaken item is ignored. One far back is of another clock: restart.
+  // Values must be finite. An overtaken item is ignored. An item far back is of another clock and
+  // restarts the judgement.
   void add(double receive_s, double sender_s) {
     if (size_ > 0 && !(sender_s > item(size_ - 1).sender_s)) {
       if (sender_s > item(size_ - 1).sender_s - kOvertaken_s) return;
@@ -49,14 +50,14 @@ class ArrivalPace {
     greatest_s_ = std::max(greatest_s_, receive_s - sender_s);
   }
 
-  // Judges the items up to the last one. Empty: the pace is not shown, or no longer. It is shown if
-  // the minima of receive - sender in two neighbouring halves of a window agree to the tolerance,
-  // each confirmed by a second item. (Delays only add, so minima count. A rise is a new stall, so
-  // it counts like a fall.) Halves are kLeastHalf_s and its doubles, so that one fits slow streams
-  // and delays with a rhythm (key frames).
+  // Judges the items up to the last one. Empty: the pace is not shown, or no longer. The pace is
+  // shown if the minima of receive - sender in two neighbouring halves of a window agree to the
+  // tolerance, each confirmed by a second item. (Delays only add, so minima count. A rise is a new
+  // stall, so it counts like a fall.) A half lasts kLeastHalf_s or one of its doubles, so that one
+  // of these lengths fits slow streams and delays with a rhythm (key frames).
   // least_half_s: the shortest half used. After a backlog the shortest window is not used, as the
   // rest of a backlog may come more slowly. no_backlog: something else shows that the last item did
-  // not wait, so it is used.
+  // not wait; the shortest window is then used.
   [[nodiscard]] std::optional<Shown> shown(double least_half_s = kLeastHalf_s,
                                            bool no_backlog = false) const {
     if (size_ < 2 * kLeastItems) return std::nullopt;
@@ -78,7 +79,7 @@ class ArrivalPace {
     return std::nullopt;
   }
 
-  // True if an item since the restart waited longer than those at this level by longer_s.
+  // True if an item since the restart waited longer by longer_s than items at the level least_s.
   [[nodiscard]] bool saw_backlog(double least_s, double longer_s = kBacklog_s) const {
     return greatest_s_ > least_s + longer_s;
   }

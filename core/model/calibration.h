@@ -78,10 +78,9 @@ inline constexpr int kParameterCount = static_cast<int>(Parameter::kCount);
 template <class S>
 using ParameterCovariance = Matrix<S, kParameterCount, kParameterCount>;
 
-// dx / d Parameter of n numbers x that were estimated with a calibration. It says how x changes if
-// the same measurements are evaluated with another calibration. The calibration's error adds
-// Sensitivity * covariance * Sensitivity^T to the covariance of x ("consider" covariance, Schmidt
-// 1966).
+// dx / d Parameter of n numbers x that were estimated with a calibration: how x changes if the same
+// measurements are evaluated with another calibration. The calibration's error adds Sensitivity *
+// covariance * Sensitivity^T to the covariance of x ("consider" covariance, Schmidt 1966).
 template <int n>
 using Sensitivity = Matrix<double, n, kParameterCount>;
 
@@ -91,7 +90,7 @@ struct Calibration {
   Mechanics<double> mechanics;
   double clock_offset = 0;     // s: telemetry clock = image clock + clock_offset
   std::optional<double> zoom;  // device units at which this calibration holds
-  // A zero row marks a parameter that is taken as exact.
+  // By Parameter, in their units. A zero row marks a parameter that is taken as exact.
   ParameterCovariance<double> covariance = ParameterCovariance<double>::Zero();
 
   // False only if the optical centre is exactly the image's middle: offset and variance are 0.

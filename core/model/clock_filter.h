@@ -4,9 +4,9 @@
 // sender_i is the sender's clock (s; RTP or device time; rate = 1 + skew) or a count (V4L2
 // sequence; rate = period). Answers line(sender_i) with its standard deviation. Beyond PTCEE 20,
 // 21.
-// The constant minimum delay is not observable: it stays in the line and in the calibrated clock
-// offset d. So the line must not step. kOneSided, items are never early: one_sided_clock.h;
-// kSymmetric, zero-mean noise: symmetric_clock.h. Bad input: accept().
+// The constant minimum delay is not observable: it stays in the line and becomes part of the
+// calibrated clock offset. So the line must not step. kOneSided (items are never early):
+// one_sided_clock.h. kSymmetric (zero-mean noise): symmetric_clock.h. Bad input: see accept().
 // Fixed memory, trivially copyable, no allocation, no exceptions; one thread.
 
 #include <algorithm>
@@ -37,7 +37,8 @@ class ClockFilter {
     return accept(receive_time_s, static_cast<double>(sequence), sequence_rate_prior(options_));
   }
 
-  // Host time of any sender time or count, by the present line. 0 before the first item.
+  // Host time of any sender time (s) or count, by the present line, and its standard deviation (s).
+  // 0 before the first item.
   double to_host(double sender) const {
     return started_ ? anchor_receive_ + line().value_at(sender - anchor_sender_) : 0.0;
   }
@@ -51,7 +52,7 @@ class ClockFilter {
   double skew() const { return line().slope - 1; }
   double period_s() const { return line().slope; }
 
-  // Sum of the steps since the start: the present minimum delay minus the first one.
+  // Sum of the minimum delay's steps since the start: the present minimum minus the first one.
   double delay_shift_s() const { return is_one_sided() ? one_sided_.shift_s() : 0.0; }
   // Receive time of the first item after the last step that was flagged by delay_stepped.
   double delay_shift_since_s() const { return is_one_sided() ? one_sided_.shift_since_s() : 0.0; }

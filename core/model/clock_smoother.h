@@ -1,12 +1,12 @@
 #pragma once
-// smooth_clock(): ClockFilter's task for a whole recording, with the help of later items. Same
-// model, options and flags as clock_filter.h, which first finds bad items, restarts and steps. Then
-// each part of the recording gets the line of the window around it:
+// smooth_clock(): ClockFilter's task for a whole recording, with the help of later items. Model,
+// options and flags are those of clock_filter.h. ClockFilter first finds bad items, restarts and
+// steps. Then each part of the recording gets the line of the window around it:
 //   kOneSided   Bayesian lower line (lower_line.h) over window_s.
 //   kSymmetric  least squares with Huber weights. The window balances noise and wander of the skew:
 //               noise^2 / (item rate * window) = skew_wander^2 * window^3 / 140 (docs/clocks.md).
-// delay_stepped marks the first item with the new minimum delay; in the filter, the item that
-// proves it. Rejected items keep the filter's answer. No allocation: the caller lends all arrays.
+// delay_stepped marks the first item with the new minimum delay; the filter's marks the item that
+// proves the step. Rejected items keep the filter's answer. The caller lends all arrays.
 
 #include <algorithm>
 #include <array>

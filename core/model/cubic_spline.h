@@ -7,7 +7,7 @@
 // segments' polynomials continue. split() inserts knots without changing the curve (Boehm; Oth,
 // section 4.2).
 // For batch estimators: the constructor and split() allocate. No shared state. Derived is the
-// subclass, the type that split() returns.
+// subclass; split() returns it. Times s, coordinates in any unit.
 
 #include <algorithm>
 #include <cstddef>
@@ -50,7 +50,8 @@ class CubicSpline {
   [[nodiscard]] double begin_s() const { return knot(0); }
   [[nodiscard]] double end_s() const { return knot(segments()); }
 
-  // hint: the likely segment. Any value is allowed.
+  // The segment of a time; an end segment if it lies outside. hint: the likely segment; any value
+  // is allowed.
   [[nodiscard]] int segment_at(double time_s, int hint = 0) const {
     const int last = segments() - 1;
     hint = std::clamp(hint, 0, last);

@@ -2,10 +2,10 @@
 // DelayWander: detects whether a stream's items leave the line of its clock repeatedly, and how
 // far.
 //   lateness_i = receive_i - line(sender_i); its minimum over a window is about 0 on the line
-// The minimum delay is constant, or it steps (MinimumDelayStep). If it rises and falls for ever,
-// one of two wanders: the delay, as behind a relay whose buffer fills and empties, or the stamps,
-// and arrivals tell the time better than the line. Stamps alone cannot tell which, so the distance
-// from the line is an uncertainty of an item's time (docs/clocks.md).
+// Usually the minimum delay is constant, or it steps (MinimumDelayStep). If it rises and falls for
+// ever, either the delay wanders, as behind a relay whose buffer fills and empties; or the stamps
+// wander, and arrivals tell the time better than the line. Stamps alone cannot tell which, so the
+// distance from the line is an uncertainty of an item's time (docs/clocks.md).
 // Fixed memory, trivially copyable, no allocation, no exceptions; one thread. Host clock, seconds.
 
 #include <algorithm>
@@ -25,7 +25,7 @@ class DelayWander {
   static constexpr double kWander_s = 1e-3;
   static constexpr double kMemory_s = 20;
 
-  // For a new line. What was seen before is kept.
+  // For a new line. The present uncertainty stays and fades.
   void restart() { windows_ = {{{kPart_s, {}, {}}, {kLongPart_s, {}, {}}}}; }
 
   // receive_s: in order. gate_s: the line's own uncertainty, >= 0.
@@ -45,8 +45,8 @@ class DelayWander {
 
   // True if the stream was off the line by kWander_s for more than kShare of the last kMemory_s.
   [[nodiscard]] bool wanders() const { return share_ > kShare; }
-  // How far an item may be off the line, as of the last item. Fades by kMemory_s if the stream
-  // wanders.
+  // s; how far an item may be off the line, as of the last item. While the stream wanders, the
+  // value fades with the time constant kMemory_s.
   [[nodiscard]] double off_s() const { return wanders() ? seen_s_ : now_s_; }
 
  private:

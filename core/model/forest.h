@@ -7,7 +7,7 @@
 
 namespace alidade::internal {
 
-// Root of a node's tree. Shortens the path to it.
+// Root of a node's tree. Shortens the node's path to the root.
 [[nodiscard]] inline int root_of(int node, std::vector<int>* parent) {
   while ((*parent)[static_cast<std::size_t>(node)] != node) {
     int& above = (*parent)[static_cast<std::size_t>(node)];

@@ -2,9 +2,9 @@
 // The lower line (lower_line.h) below the lowest item of each time slot of a sliding window.
 // At first each item has its own slot. When all slots are taken, neighbours are joined in pairs
 // until the slots span the window. From then on the oldest is dropped.
-// Once locked, a slot counts only at an age of settle_s / 10, so that items that reveal a fall of
-// the minimum delay have not yet moved the line. bound_rate() then limits the rate to the last
-// window's, as far as clocks wander.
+// Once locked, a slot counts only from an age of settle_s / 10 on. So the items that reveal a fall
+// of the minimum delay have not moved the line yet when the fall is noticed. bound_rate() limits
+// the rate to the last window's, plus what clocks wander.
 // Fixed memory, trivially copyable, no allocation, no exceptions. x: sender seconds or counts; y:
 // host seconds; both from the first item.
 
@@ -107,7 +107,7 @@ class LowerEnvelope {
     }
   }
 
-  // From now on the rate may leave this window's only as far as clocks wander.
+  // From now on the rate may differ from this window's only by what clocks wander.
   void bound_rate() {
     constexpr double kReach = 6;  // sigmas
     const double reach = kReach * std::sqrt(line_.var_slope) + 1e-9 * prior_.rate +

@@ -150,9 +150,9 @@ inline LineEstimate fit_lower_line(const double* x, const double* y, std::size_t
 }
 
 // Scale of the delays, from their residuals above the lowest point along a fitted line. Uses a low
-// quantile, as the density next to the minimum counts and heavy tails do not: rank n / 8, but at
-// least min(n / 2, 16). `least` keeps the scale positive. `guess` weighs as much as two points.
-// residual: room for n values.
+// quantile, rank n / 8 but at least min(n / 2, 16): the density next to the minimum counts, heavy
+// tails do not. least: the result is at least this, > 0. guess: of the scale; it weighs as much as
+// two points. residual: room for n values.
 inline double delay_scale(const double* x, const double* y, std::size_t n, const LineEstimate& line,
                           double least, double guess, double* residual) {
   constexpr double kGuessWeight = 2;

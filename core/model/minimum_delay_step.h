@@ -4,7 +4,7 @@
 // first early one on.
 //   rise  no item comes down to the line for settle_s
 //   fall  some items come before the line
-// It is a step only if the minimum residuals of two neighbouring halves of settle_s agree.
+// Either is a step only if the minimum residuals of two neighbouring halves of settle_s agree.
 // Fixed memory, trivially copyable, no allocation, no exceptions. All times are host seconds.
 // Statistics: docs/clocks.md.
 
@@ -40,8 +40,8 @@ class MinimumDelayStep {
   }
 
   // The step, if a run has lasted until this receive time and shows one. Both runs then begin anew.
-  // Call it before the item is added to a run. rate_sigma: of the line's rate (host seconds per
-  // host second); the halves may differ by it.
+  // To be called before the item is added to a run. rate_sigma: of the line's rate (host seconds
+  // per host second); the halves of a run may differ by it.
   std::optional<DelayStep> judge(double receive_s, double rate_sigma = 0) {
     const double drift_s = kReach * rate_sigma * settle_s_ / 2;
     const std::optional<DelayStep> fall = judge(&early_, true, receive_s, drift_s);
@@ -49,7 +49,7 @@ class MinimumDelayStep {
   }
 
   void add_late(double receive_s, double residual_s) { late_.add(receive_s, residual_s, false); }
-  // The same item; mean_s: usual mean delay above the line.
+  // The same item, after add_late(). mean_s: usual mean delay above the line.
   void suspect(double receive_s, double residual_s, double mean_s) {
     stretch_.add(receive_s, residual_s, std::max(mean_s, resolution_s_));
   }

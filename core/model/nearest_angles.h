@@ -1,8 +1,8 @@
 #pragma once
-// True pan and tilt angles at which a mount comes nearest to an orientation: least squares of xi in
-// R = R_base_from_camera(angle) Exp(xi), by Gauss-Newton from the angles for nominal axes. A mount
-// has no roll, so a rest `off` remains. If the camera looks along the pan axis, the angles are not
-// unique. No allocation, no state.
+// True pan and tilt angles at which a mount comes nearest to an orientation R: least squares of xi
+// in R = R_base_from_camera(angle) Exp(xi), by Gauss-Newton from the angles for nominal axes. A
+// mount has no roll, so a difference `off` remains. If the camera looks along the pan axis, the
+// angles are not unique. No allocation, no state.
 
 #include <algorithm>
 #include <cmath>
@@ -18,8 +18,8 @@ struct NearestAngles {
   double off = 0;  // rad; angle between the mount's orientation and the given one
 };
 
-// The change of (pan, tilt) that explains most of a camera rotation xi, from J_xi_angle of
-// R_base_from_camera().
+// d (pan, tilt) / d xi: the change of the angles that explains most of a camera rotation xi.
+// J_xi_angle: of R_base_from_camera().
 [[nodiscard]] inline Matrix<double, 2, 3> J_angle_xi(const Matrix<double, 3, 2>& J_xi_angle) {
   const Matrix2<double> normal = J_xi_angle.transpose() * J_xi_angle;
   return normal.inverse() * J_xi_angle.transpose();

@@ -4,8 +4,8 @@
 // minimum delay (minimum_delay_step.h) beyond min_delay_step_s is subtracted from all later receive
 // times: the line continues, and its variance grows by the step's. While a rise is suspected, late
 // items do not count. Before the lock the line follows a fall. If fewer than kLeastOnLine items
-// have come down to the line before a rise, an early item had dragged it down: the line moves up
-// instead, and only items since the rise count.
+// have come down to the line before a rise, it was an early item that dragged the line down: the
+// line then moves up, and only items since the rise count.
 // Fixed memory, trivially copyable, no allocation, no exceptions. All times are host seconds.
 
 #include <algorithm>

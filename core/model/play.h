@@ -3,9 +3,9 @@
 //   dragged = d - (b / 2) h,   h_i = clip(h_(i-1) + 2 (d_i - d_(i-1)) / b, -1, 1)
 // Encoder on the motor: the reading drives, the camera is dragged. Encoder behind the gear: the
 // camera drives, the reading is dragged. h is the state: at first anywhere in [-1, 1]. Each
-// movement narrows that interval.
-// A movement by b in one direction makes it known. Angles are rad, any turn. Differences go the
-// short way round, so neighbours must be less than half a turn apart. Plain values; no allocation.
+// movement narrows this interval; a movement by b in one direction makes h known. Angles are rad,
+// any turn. Differences go the short way round, so consecutive angles must be less than half a turn
+// apart. Plain values; no allocation.
 
 #include <algorithm>
 #include <cmath>
@@ -17,7 +17,7 @@ namespace alidade {
 enum class PlayKind {
   kNone,
   kMotor,  // encoder on the motor: the camera stands still while the reading crosses the play
-  kOutput  // encoder behind the gear: the reading stands still while the camera crosses it
+  kOutput  // encoder behind the gear: the reading stands still while the camera crosses the play
 };
 
 struct Play {
@@ -94,8 +94,8 @@ class DraggedAngle {
   bool begun_ = false;
 };
 
-// The driver, computed from the dragged angle. While that one stands still, the driver may be
-// anywhere within the play.
+// The driver, computed from the dragged angle. While the dragged angle stands still, the driver may
+// be anywhere within the play.
 class DrivingAngle {
  public:
   explicit DrivingAngle(const Play& play = {}) : play_(play) {}
@@ -126,8 +126,8 @@ class DrivingAngle {
   bool begun_ = false;
 };
 
-// The true angle, computed from readings, for either kind. Give each reading once, in order,
-// without scale and error curve.
+// The true angle, computed from readings, for either kind. next() takes each reading once, in
+// order, after scale and error curve were removed.
 class PlayOfReadings {
  public:
   explicit PlayOfReadings(const Play& play = {})

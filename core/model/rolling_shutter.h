@@ -5,9 +5,9 @@
 //   back-projection, direct:    d_b = R_base_from_camera(angle(v)) unproject(u),  v = u_v
 //   projection, solved for v:   v = project(R_base_from_camera(angle(v))^T d_b)_v
 // v is continuous; the solved row may lie outside the image. It is unique while the slope d
-// project_v / d v < 1: the direction's image moves down more slowly than the read-out. If that
-// fails between the reference row and the solution, the status is kNoRow. A direction that the
-// camera refuses at the reference row gets that status.
+// project_v / d v is below 1: the direction's image moves down more slowly than the read-out. If
+// the slope reaches 1 between the reference row and the solution, the status is kNoRow. If the
+// camera refuses the direction at the reference row, the status is the camera's.
 // Domain: as camera.h and mechanics.h. Outputs are written with kOk only. No allocation.
 
 #include <Eigen/Core>
@@ -22,7 +22,7 @@ namespace alidade {
 
 // The motion of mount and lens about one frame: TRUE angles (rad), rates (rad/s) and constant
 // accelerations (rad/s^2) when reference_row is exposed. zoom_rate is d log f / dt (1/s): log f(v)
-// = log f + zoom_rate t (zoom_law.h). The camera is that at reference_row.
+// = log f + zoom_rate t (zoom_law.h). The camera in all calls is the camera at reference_row.
 // PTCEE 26, 27 hold the body rate constant. Here the ANGLES move at constant rates or, if known, at
 // constant accelerations. A rate that grows by half a field of view per second within a second
 // bends a frame with a read-out of 30 ms by 0.1 px.
@@ -146,8 +146,8 @@ template <class S>
   return ProjectionStatus::kOk;
 }
 
-// Pixel of a direction if every row were exposed when `row` is (PTCEE 41, 42). J_u_row is the
-// image's motion per row. Its second component is the slope above.
+// Pixel of a direction if every row were exposed at the time of `row` (PTCEE 41, 42). J_u_row is
+// the image's motion per row; its second component is the slope above.
 template <class S>
 [[nodiscard]] ProjectionStatus project_at_row(
     const Camera<S>& camera, const Mechanics<S>& mechanics, const NonDeduced<S>& line_delay,

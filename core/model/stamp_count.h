@@ -1,9 +1,9 @@
 #pragma once
 // StampCount: detects stamps that count items instead of telling time.
 //   sender_i = constant + step (i + lost in the network),  whatever time passes between two items
-// Such a sender leaves items out or takes them at another rate, and its stamps do not show it:
-// receive - sender rises and never falls again. A growing backlog rises too, but not for ever
-// (docs/clocks.md).
+// If such a sender leaves items out or takes them at another rate, its stamps do not show this:
+// receive - sender rises and never falls again. With a growing backlog receive - sender rises too,
+// but not for ever (docs/clocks.md).
 // Fixed memory, trivially copyable, no allocation, no exceptions; one thread. All times are
 // seconds.
 

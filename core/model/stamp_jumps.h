@@ -1,9 +1,10 @@
 #pragma once
 // StampJumps: detects stamps that jump although the items come evenly.
 //   jump_i = (sender_i - sender_(i-1)) - (receive_i - receive_(i-1))
-// A varying delay moves the arrival. An item left out moves both, except at the end of a backlog.
-// If the arrival came at the usual interval and the stamp did not, the stamp jumped, and the line
-// through the stamps is at once off by that much. Slow wander is DelayWander's task.
+// A varying delay moves the arrival. An item that is left out moves arrival and stamp, except at
+// the end of a backlog. If the arrival came at the usual interval and the stamp did not, the stamp
+// jumped, and the line through the stamps is off by the jump at once. Slow wander is DelayWander's
+// task.
 // Fixed memory, trivially copyable, no allocation, no exceptions; one thread. All times are
 // seconds.
 
@@ -22,10 +23,10 @@ class StampJumps {
   void restart() { *this = StampJumps(); }
 
   // Values must be finite. behind_backlog: the item before had waited. Overtaken items are ignored.
-  // A jump: the stamp's interval differs from the usual one by more than twice the arrival's
-  // difference, and |jump| exceeds kLeast_s and kGate times the arrivals' mean deviation. It fades
-  // with kMemory_s: by then the line has taken up a single step, and a clock that jumps does so
-  // again.
+  // A jump: the stamp's interval differs from the usual interval by more than twice the difference
+  // of the arrival's interval, and |jump| exceeds kLeast_s and kGate times the arrivals' mean
+  // deviation. A jump fades with kMemory_s: by then the line has taken up a single step, and a
+  // clock that jumps has jumped again.
   void add(double receive_s, double sender_s, bool behind_backlog) {
     const double arrival_s = receive_s - last_receive_s_;
     const double stamp_s = sender_s - last_sender_s_;

@@ -1,10 +1,10 @@
 #pragma once
 // StampRate: detects stamps that run at another rate than the items arrive.
 //   receive_i - sender_i = constant + b receive_i + delay_i,    stamps' rate = 1 - b
-// A quartz clock keeps |b| below 2e-4. Stamps counted at a nominal rate that the camera does not
-// keep, or on a clock of another frequency than stated, drift from the arrivals evenly and for
-// ever. A backlog that shrinks (b < 0) or grows (b > 0) drifts too, but it ends, and it is uneven
-// as pictures differ in size (docs/clocks.md).
+// A quartz clock keeps |b| below 2e-4. Stamps that count items at a nominal rate which the camera
+// does not keep, or on a clock of another frequency than stated, drift from the arrivals evenly and
+// for ever. A backlog that shrinks (b < 0) or grows (b > 0) makes a drift, too; but this drift
+// ends, and it is uneven as pictures differ in size (docs/clocks.md).
 // Fixed memory, trivially copyable, no allocation, no exceptions; one thread. All times are
 // seconds.
 

@@ -2,11 +2,11 @@
 // SteadyZoom: removes jitter from a lens's zoom readings. The only place that decides whether two
 // readings are the same zoom.
 //   no jitter   readings that stand still, or move without reversing all the time, pass unchanged
-//   jitter      is detected by changes that reverse as often as chance has it, about a constant
-//               level; sigma comes from their differences and spread. From then on readings at rest
+//   jitter      is detected by changes that reverse as often as chance makes them, about a constant
+//               level; sigma comes from the changes and the spread. From then on readings at rest
 //               are replaced by the level, until the median of the latest five leaves it; readings
 //               of a movement pass unchanged
-// A given tolerance replaces all that: readings pass unchanged. Fixed memory; no allocation.
+// With a given tolerance jitter is not searched for: readings pass unchanged. Fixed memory.
 
 #include <algorithm>
 #include <array>
@@ -21,10 +21,11 @@ class SteadyZoom {
   static constexpr double kFar = 6;  // sigmas; readings farther off are movements or glitches
 
   SteadyZoom() = default;
-  // tolerance: device units; two readings within it are the same zoom. None: found from the jitter.
+  // tolerance: device units; two readings no further apart are the same zoom. Empty: found from the
+  // jitter.
   explicit SteadyZoom(std::optional<double> tolerance) : given_(tolerance) {}
 
-  // zoom: finite, device units. Returns the steady reading.
+  // time_s: in order. zoom: finite, device units. Returns the steady reading.
   double add(double time_s, double zoom) {
     found_now_ = false;
     if (given_) return zoom;
@@ -41,7 +42,8 @@ class SteadyZoom {
     return rests_ ? at_rest(zoom) : moving(zoom);
   }
 
-  // Sets the jitter known from earlier readings. The next reading begins a rest.
+  // sigma: of the jitter, as known from earlier readings; device units. The next reading begins a
+  // rest.
   void know(double sigma) {
     sigma_ = own_sigma_ = creep_ = sigma;
     rests_ = true;
@@ -52,12 +54,12 @@ class SteadyZoom {
   // True if the last reading revealed the jitter.
   [[nodiscard]] bool found_now() const { return found_now_; }
   [[nodiscard]] double sigma() const { return sigma_; }  // device units
-  // Number of the present rest; it counts up when one begins. Empty if the last reading passed
-  // unchanged.
+  // Number of the present rest, counted up at the beginning of each. Empty if the last reading
+  // passed unchanged.
   [[nodiscard]] std::optional<std::size_t> rest() const {
     return steadied_ ? std::optional<std::size_t>(rest_) : std::nullopt;
   }
-  // Device units; two steady readings within it are the same zoom.
+  // Device units; two steady readings no further apart are the same zoom.
   [[nodiscard]] double tolerance() const { return given_.value_or(kOneZoom * sigma_); }
 
   // Rounded to the figures that the jitter leaves significant. Needs has_jitter().

@@ -2,10 +2,10 @@
 // Errors of telemetry's angles besides scale and noise, for each axis:
 //   measured = scale true + g(true) + play                              (play: play.h)
 // The curve g of the true angle is Catmull-Rom between uniform knots, linear in the knots' values.
-// At the distance d beyond the edge knot it fades: g = g(edge) e, e = exp(-d^2 / (2 length^2)), and
-// its variance becomes unseen_sigma^2. Knots that fill a whole turn have no edge. Angles are rad,
-// any turn; they are wrapped here. The slope of g must stay below the scale, so that the inverse
-// exists: see validate(). Plain values in fixed memory; no allocation.
+// At the distance d beyond the edge knot the curve fades: g = g(edge) e, e = exp(-d^2 / (2
+// length^2)), and its variance becomes unseen_sigma^2. Knots that fill a whole turn have no edge.
+// Angles are rad, any turn; they are wrapped here. The slope of g must stay below the scale, so
+// that the inverse exists: see validate(). Plain values in fixed memory; no allocation.
 
 #include <algorithm>
 #include <array>
@@ -34,8 +34,8 @@ struct AngleErrorCurve {
   double spacing_rad = 0;                  // > 0 with two knots or more
   int count = 0;                           // knots; 0: no curve
   std::array<double, kMaxKnots> values{};  // rad
-  std::array<double, kMaxKnots> sigmas{};  // rad, of the values: what is left of g there
-  double length_rad = 0;                   // correlation length of what is left
+  std::array<double, kMaxKnots> sigmas{};  // rad, of the values
+  double length_rad = 0;                   // correlation length of the values' errors
   double unseen_sigma_rad = 0;             // of g where there is no knot
 
   // False: nothing is known of an error.
@@ -208,7 +208,7 @@ struct TelemetryError {
   return scale * true_angle + error.at(true_angle);
 }
 
-// The inverse. *rate_factor, if not null: true rate / measured rate there.
+// The inverse. *rate_factor, if not null: true rate / measured rate at this angle.
 [[nodiscard]] inline double true_from_measured(double scale, const AngleErrorCurve& error,
                                                double measured, double* rate_factor = nullptr) {
   double angle = measured / scale;

@@ -1,6 +1,6 @@
 #pragma once
-// Square markers of OpenCV's predefined dictionaries. This is all that needs opencv_aruco, which
-// not every build has: CMake chooses aruco_markers.cpp or no_aruco_markers.cpp.
+// Square markers of OpenCV's predefined dictionaries. Nothing else needs opencv_aruco, which some
+// builds lack: CMake chooses aruco_markers.cpp or no_aruco_markers.cpp.
 
 #include <opencv2/core.hpp>
 #include <vector>
@@ -15,8 +15,8 @@ struct ArucoMarker {
   std::vector<cv::Point2f> corners;  // OpenCV's pixels, from the marker's upper left clockwise
 };
 
-// dictionary: index into kMarkerDictionaries. Each id at most once. Corners to about a pixel. Some
-// may not be markers.
+// image: 8-bit grey. dictionary: index into kMarkerDictionaries. Each id at most once. Corners are
+// good to about a pixel. Some results may not be markers.
 [[nodiscard]] std::vector<ArucoMarker> find_markers(const cv::Mat& image, int dictionary);
 
 // A marker's cells as printed, with its border of one black cell: 0 is black, all else white.

@@ -1,11 +1,12 @@
 #pragma once
 // calibrate_pattern(): line delay and lens, with covariance, from a video of a known pattern taken
-// by a moving camera (Oth et al., 2013). Intrinsics and distortion are estimated with the line
-// delay, which the paper leaves open. Start: lens and poses as if all rows were exposed at once.
-// Repeatedly: adjust curve and lens, reject wrong detections, estimate their noise, split the curve
-// where residuals ask for it. Last: least squares on the inliers. A pattern larger or smaller than
-// named is not noticed: lens and line delay stay the same, positions and distances scale. One that
-// is stretched or bent shows by its misfit. Batch work: allocates; touches no file.
+// by a moving camera (Oth et al., 2013). Intrinsics and distortion are estimated together with the
+// line delay; the paper leaves this open. Start: lens and poses as if all rows were exposed at
+// once. Repeatedly: adjust curve and lens, reject wrong detections, estimate the noise of the
+// others, split the curve where residuals ask for it. Last: least squares on the inliers. A pattern
+// larger or smaller than named is not noticed: lens and line delay stay the same, positions and
+// distances scale. A stretched or bent pattern shows by the misfit. Batch work: allocates; touches
+// no file.
 
 #include <string>
 #include <vector>
@@ -20,7 +21,7 @@ enum class PatternStatus {
   kOk,
   kBadInput,         // sizes, indices, times or numbers contradict pattern_data.h
   kNoPattern,        // no frame shows enough of the pattern
-  kTooFewFrames,     // or the video is too short
+  kTooFewFrames,     // too few show the pattern, or the video is too short
   kNoStart,          // the views do not determine a lens, even roughly
   kNotConverged,     // no curve explains the detections
   kFrameRateTooLow,  // the curve cannot follow the motion

@@ -4,8 +4,8 @@
 //   the homography of the corners around predicts more.
 //   2. The markers are painted over. What remains is a chessboard, whose corners are refined as
 //   such, in windows larger than the white rim around a marker.
-//   3. Corners are dropped that differ from themselves after half a turn (something lies on them)
-//   or do not lie where their neighbours predict.
+//   3. Corners are dropped whose image changes by half a turn (something lies on them), or that do
+//   not lie where their neighbours predict.
 
 #include <opencv2/core.hpp>
 #include <string>
@@ -20,11 +20,11 @@ class CharucoGrid {
  public:
   explicit CharucoGrid(const KnownPattern& pattern);
 
-  // image: 8-bit grey. corners: OpenCV's pixels. points: the index of each into
-  // KnownPattern::points_m. Both stay empty if the board is not found.
+  // image: 8-bit grey. corners: OpenCV's pixels. points: for each corner its index into
+  // KnownPattern::points_m. Both are empty if the board is not found.
   void find(const cv::Mat& image, std::vector<cv::Point2f>* corners, std::vector<int>* points);
 
-  // One line: why no image so far showed this board, and what would help. Empty if one did.
+  // One line: why no image so far showed this board, and what would help. Empty if an image did.
   [[nodiscard]] std::string doubt() const;
 
  private:

@@ -3,8 +3,9 @@
 // image belong to the board. A marker counts if it and its neighbours predict each other's places;
 // wrongly read markers do not.
 // Before OpenCV 4.6 a board with an even number of rows had its colours, and so its markers, the
-// other way round. The majority of neighbours in the images so far decides. Until then no marker
-// counts, as a part of a board may fit both layouts. One thread at a time.
+// other way round. The majority of neighbours in the images so far decides which layout it is.
+// Before the decision no marker counts, as a part of a board may fit both layouts. One thread at a
+// time.
 
 #include <array>
 #include <cstddef>
@@ -39,7 +40,8 @@ class CharucoLayout {
   [[nodiscard]] int images_with_markers() const { return images_with_markers_; }
   // Markers agree, but equally well in both layouts.
   [[nodiscard]] bool is_undecided() const;
-  // Another dictionary of which many markers were found, if none of this one's were.
+  // Another dictionary of which many markers were found, while no marker of the board's dictionary
+  // was. Empty: none.
   [[nodiscard]] std::optional<int> other_dictionary() const { return other_dictionary_; }
 
  private:

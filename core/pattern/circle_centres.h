@@ -1,10 +1,10 @@
 #pragma once
 // Centres of the circles of a grid, to a hundredth of a pixel.
-//   1. The centroid of what is darker than the paper around, weighted by how much, in a window that
-//   is round in the pattern. Blur and noise do not shift it.
+//   1. The centroid of the darkness, measured against the paper around, in a window that is round
+//   in the pattern. Blur and noise do not shift this centroid.
 //   2. Perspective and lens shift the centroid against the image of the centre by some hundredths
-//   of a pixel. The shift is computed from the map from pattern to image, which the whole grid
-//   gives, and the measured radius; it is taken off.
+//   of a pixel. The shift is computed from the measured radius and the map from pattern to image,
+//   which the whole grid gives; it is subtracted.
 
 #include <opencv2/core.hpp>
 #include <vector>

@@ -13,7 +13,7 @@
 namespace alidade {
 
 // Corrects the centres of circles. The detector derived them from centroids with the lens and
-// perspective of the grid; this uses the known lens and pose. Other observations stay as they are.
+// perspective of the grid; this function uses the known lens and pose. Other observations stay.
 [[nodiscard]] PatternData recentred(PatternData data, const LensVector& lens,
                                     const PoseCurve& curve);
 

@@ -2,10 +2,10 @@
 // score_knots(): whether and where the pose curve needs more knots. A score test: by how much would
 // the sum of squared residuals fall if segments were halved (one Gauss-Newton step of the curve
 // alone, the lens held)? Each knot adds six unknowns, so pure noise gives a chi-square of six
-// degrees of freedom a segment. More means that the curve does not follow the motion. Sharper than
-// (Oth, section 4.2), which tests a segment's whole cost: there noise drowns a bias of every
-// residual. It ends, as halves have a least length: beyond two knots a frame the curve follows
-// noise, and the line delay's sigma collapses.
+// degrees of freedom a segment. A larger gain means that the curve does not follow the motion.
+// (Oth, section 4.2) tests a segment's whole cost, in which noise drowns a bias that all residuals
+// share. Halves have a least length, so that splitting ends: with more than two knots a frame the
+// curve follows noise, and the line delay's sigma collapses.
 
 #include <vector>
 
@@ -21,9 +21,9 @@ struct KnotScoreOptions {
 
 struct KnotScore {
   std::vector<int> split;    // segments to halve, in increasing order
-  double gain = 0;           // of squared residuals in sigma^2, if all that can be were halved
-  double expected = 0;       // from noise alone
-  double gain_of_short = 0;  // if those that are too short for it were halved
+  double gain = 0;           // fall of the sum of squares (sigma^2) if all long enough were halved
+  double expected = 0;       // of gain, from noise alone
+  double gain_of_short = 0;  // the same for the segments that are too short to be halved
   double expected_of_short = 0;
 };
 

@@ -5,9 +5,9 @@
 //   min over (f, alpha, k, R) of  sum_i |camera(R d_i) - u_i|^2   u_i: grid, d_i = lens^-1(u_i)
 // The rotation R absorbs the direction of the lens's axis; in a mount the pan and tilt axes do. For
 // k2 = p1 = p2 = 0 and a centre in the middle, k = k1 exactly. The covariance is the lens's,
-// propagated by the minimum's derivative, plus what one k cannot express: the nearest camera of the
-// image's middle, its rim or a half differs from that of the whole. The largest difference of each
-// parameter counts as one sigma. Allocates.
+// propagated by the minimum's derivative, plus the variance of what one k cannot express: the
+// nearest camera for the image's middle, its rim or one half differs from the nearest camera for
+// the whole image, and the largest difference of each parameter counts as one sigma. Allocates.
 
 #include <optional>
 

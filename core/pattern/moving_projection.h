@@ -1,6 +1,6 @@
 #pragma once
-// A point of the pattern as a rolling shutter sees it while the camera moves. Its row v determines
-// when it is seen, and the time determines the row:
+// A point of the pattern as a rolling shutter sees it while the camera moves. The point's row v
+// determines the time at which it is seen, and the time determines the row:
 //   v = project(p_camera(t_frame + v * line_delay))_v                  (Oth 6, solved for v)
 // This uses the predicted row, not the measured one. So the residual's covariance is the
 // detection's own, and (Oth 18 to 21) is not needed. Jacobians follow from the implicit function

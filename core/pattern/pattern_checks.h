@@ -23,7 +23,7 @@ struct PatternViews {
 };
 [[nodiscard]] PatternViews views_of(const PatternData& data);
 
-// Median time from one frame to the next, s; 0 with less than two.
+// Median time from one frame to the next, s; 0 with fewer than two frames.
 [[nodiscard]] double frame_interval(const PatternData& data);
 
 // Share of the image below which going nearer helps most.

@@ -1,7 +1,7 @@
 #pragma once
-// progress_of(): what a video of a known pattern has shown so far, while it is taken, whether that
-// is enough for a calibration, and what would help if not. The limits: beyond them simulated
-// recordings give lens and line delay as precisely as a video of that length can
+// progress_of(): what a video of a known pattern has shown so far, while it is taken; whether this
+// suffices for a calibration; and what would help if it does not. In simulated recordings that meet
+// the limits, lens and line delay are as precise as a video of the same length can make them
 // (test/core/pattern/pattern_progress_test). Times need not be steady. Pure; allocates; takes
 // milliseconds, and a tenth of a second for the views' tilt.
 
@@ -15,14 +15,14 @@ namespace alidade {
 
 struct PatternProgress {
   double seen_s = 0;          // time during which consecutive frames show the pattern
-  double unseen_s = 0;        // since it was last seen, or since the first frame
-  double last_seen_s = 0;     // when it was last seen, since the first frame
+  double unseen_s = 0;        // since the pattern was last seen, or since the first frame
+  double last_seen_s = 0;     // when it was last seen, from the first frame on
   double found = 0;           // share of the last seconds' frames that show it
   double extent = 0;          // as PatternViews::extent
   double speed = 0;           // of points in the image, image heights/s, root mean square
   double unfollowed = 0;      // unfollowed_motion() of the last seconds' frames
   double distance_ratio = 1;  // farthest over nearest
-  // rad; how far its left, right, upper and lower side was nearer than the opposite one.
+  // rad; largest tilt with the pattern's left, right, upper and lower side nearer than the other.
   std::array<double, 4> tilt{};
   // For each ninth of the image, row by row: the share of its cells in which points were seen.
   std::array<double, 9> covered{};

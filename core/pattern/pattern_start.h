@@ -17,8 +17,8 @@ struct FramePose {
   Vector3<double> centre = Vector3<double>::Zero();  // of the camera, m, pattern frame
 };
 
-// Focal length and k1, with the optical centre in the image's middle; fixed parameters at their
-// mean. Empty if the views do not determine it.
+// Focal length and k1, with the optical centre in the image's middle; fixed parameters are at their
+// mean. Empty if the views do not determine the lens.
 [[nodiscard]] std::optional<LensVector> start_lens(const PatternData& data,
                                                    const LensKnowledge& knowledge);
 

@@ -1,6 +1,6 @@
 #pragma once
-// How a camera sees a pattern from one pose: tilt and distance, which must vary to determine the
-// lens. Camera frame RDF, pattern frame as in pattern_data.h.
+// How a camera sees a pattern from one pose: tilt and distance. Both must vary in a video to
+// determine the lens. Camera frame RDF, pattern frame as in pattern_data.h.
 
 #include <cmath>
 #include <vector>

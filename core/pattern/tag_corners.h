@@ -1,8 +1,8 @@
 #pragma once
 // Corners of a tag in an AprilGrid to a few hundredths of a pixel, even where its cells are only
-// two pixels wide. The image around each corner is known: the tag's border, the code's cells next
-// to it, and the black square outside or its absence. This image, blurred along both edges, is
-// fitted to the one seen by least squares over position, brightness, contrast and blur.
+// two pixels wide. What is printed around each corner is known: the tag's border, the code's cells
+// next to it, and the black square outside or its absence. This print, blurred along both edges, is
+// fitted to the image by least squares over position, brightness, contrast and blur.
 
 #include <array>
 #include <opencv2/core.hpp>
@@ -34,8 +34,8 @@ using CornerSquares = std::array<bool, 4>;
                                       const CornerSquares& squares, double gap,
                                       std::vector<cv::Point2f>* corners);
 
-// How much more of the image about each corner a square outside explains than white paper does
-// (share of the variance). 0: undecided.
+// For each corner: the share of the image's variance that a square outside explains, minus the
+// share that white paper explains. 0: undecided.
 [[nodiscard]] std::array<double, 4> evidence_of_squares(const cv::Mat& image, const TagFace& face,
                                                         double gap,
                                                         const std::vector<cv::Point2f>& corners);

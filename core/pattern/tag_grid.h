@@ -1,11 +1,11 @@
 #pragma once
 // TagGrid: the tags of an AprilGrid in an image. Tags may have a black border of one cell
 // (libapriltag) or two (kalibr), with or without kalibr's black squares where gaps cross: the
-// images decide. Squares touch the tags' corners. A tag's outline is then no separate quad, and
+// images decide. Squares touch the tags' corners, so that a tag's outline is no separate quad and
 // libapriltag finds only some tags. The grid grows from these: the homography of the nearest known
-// tags predicts a neighbour's corners, which are refined and accepted if its code is there. In a
-// video the tags of the previous images, extrapolated, are the first guess, which saves most
-// searches. One thread at a time.
+// tags predicts a neighbour's corners; they are refined, and accepted if the neighbour's code is
+// there. In a video the first guess is the tags of the previous images, extrapolated; this saves
+// most searches. One thread at a time.
 
 #include <array>
 #include <cstddef>

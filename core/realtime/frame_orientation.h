@@ -5,8 +5,8 @@
 //   t = v * line_delay   (PTCEE 26, 27, and beyond)
 // Angles are TRUE (rad): the measured ones divided by the calibrated scales. Frames: base b (FRD),
 // camera c (RDF). An orientation is perturbed as R Exp(xi), xi in the camera frame (PTCEE 5). xi is
-// what directions are off by in the picture's middle: an optical centre that is off by c px is in
-// it, together with the axes, which that turned by c / f.
+// the error of directions in the image's middle. It includes the error c of the optical centre (px)
+// together with the turn of the axes by c / f that goes with it.
 // Pixels are continuous; the centre of the top-left one is (0.5, 0.5). Covariances are first-order
 // and contain the calibration's. No allocation; plain values; any number of threads may read one.
 
@@ -50,11 +50,11 @@ struct FrameOrientation {
   // At row 0.
   PanTilt<double> angle;  // rad, true, not wrapped
   PanTilt<double> rate;   // rad/s, true
-  // rad/s^2, true, constant during the frame. 0 in PT mode, where the covariance contains its
-  // effect.
+  // rad/s^2, true, constant during the frame. 0 in PT mode: there the covariance contains the
+  // effect of an acceleration.
   PanTilt<double> acceleration;
   double zoom_rate = 0;  // 1/s, d log f / dt; calibration.camera holds at row 0
-  // 1/s; none: the frame does not show it, and the lens is taken as at rest.
+  // 1/s; empty: the frame does not show zoom_rate, and the lens is taken to be at rest.
   std::optional<double> zoom_rate_sigma;
   MotionCovariance motion_covariance = MotionCovariance::Zero();  // WITHOUT the calibration's part
   Sensitivity<6> motion_sensitivity = Sensitivity<6>::Zero();     // gives the calibration's part

@@ -3,9 +3,9 @@
 //   measured angle and rate at  t0 + clock_offset + line_delay * height / 2,
 //   divided by the scales, extrapolated to row 0 at that rate.
 // t0 is the capture time of row 0 on the image clock; clock_offset converts it to telemetry time.
-// The paper looks up row 0. The middle row is nearest to all rows, so an accelerating mount does
-// the least harm. The remaining error (half the acceleration times the squared time to the middle
-// row, averaged over the rows) is added to the covariance.
+// The paper looks up row 0. The middle row is nearest to all rows, so there an acceleration of the
+// mount makes the least error. The remaining error (half the acceleration times the squared time to
+// the middle row, averaged over the rows) is added to the covariance.
 // No allocation, no state, no waiting.
 
 #include "core/model/calibration.h"
@@ -14,8 +14,8 @@
 
 namespace alidade {
 
-// From the measured state when the middle row was exposed. False if a result is not finite; *out is
-// then unchanged.
+// measured: when the middle row was exposed. frame_time_s: t0. False if a result is not finite;
+// *out is then unchanged.
 [[nodiscard]] bool pt_orientation(const Calibration& calibration, double frame_time_s,
                                   const InterpolatedPanTilt& at_middle_row, FrameOrientation* out);
 

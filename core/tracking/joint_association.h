@@ -3,26 +3,28 @@
 //   r(t, j) = P_D N(z_j; expected, S) / lambda    t against a false alarm; 0 outside t's gate
 //   m(t) = 1 - P_D P_G                            t is missed, or outside its gate
 // An event pairs targets and detections one to one; its weight is the product of r of the pairs and
-// m of the other targets. lambda: density of false alarms. A cluster is what shared detections
-// connect. kExact takes clusters of at most kLargestExactCluster targets and detections, and kCheap
-// for others. Fixed memory after construction; no allocation. Equal input gives equal weights.
-// Details: docs/derivations.md.
+// m of the other targets. lambda: density of false alarms, per unit of measured area. A cluster is
+// a set of targets and detections that shared detections connect. Fixed memory after construction;
+// no allocation. Equal input gives equal weights. Details: docs/derivations.md.
 
 #include <array>
 #include <vector>
 
 namespace alidade {
 
-// kExact: share of all events' weight in which t has j (Fortmann, Bar-Shalom, Scheffe 1983).
+// kExact: the weight of the events in which t has j, over the weight of all events (Fortmann,
+// Bar-Shalom, Scheffe 1983); in clusters of more than kLargestExactCluster targets or detections
+// kCheap is used.
 // kCheap: r / (row sum + column sum - r + m) (Fitzgerald 1986; Lisanti et al.'s [27]); PDA if no
 // targets share detections.
-// kNearest: 1 for the pair with the largest r, then among what is left; the baseline.
+// kNearest: 1 for the pair with the largest r, then for the largest r of the targets and detections
+// that are left; the others 0. The baseline.
 enum class AssociationMethod { kExact, kCheap, kNearest };
 
 // A detection within a target's gate.
 struct GatedPair {
-  int target = 0;
-  int detection = 0;
+  int target = 0;     // index
+  int detection = 0;  // index
   double ratio = 0;   // r
   double weight = 0;  // beta, the result
 };
@@ -39,7 +41,7 @@ class JointAssociation {
   void weigh(AssociationMethod method, const double* missed, int targets, GatedPair* pairs,
              int count);
 
-  // Clusters of the last call with kExact: weighed exactly, and too large for that.
+  // Clusters of the last call with kExact: those weighed exactly, and those too large for it.
   [[nodiscard]] int exact_clusters() const { return exact_clusters_; }
   [[nodiscard]] int cheap_clusters() const { return cheap_clusters_; }
 

@@ -4,8 +4,9 @@
 //   kSphere  s = [azimuth, elevation, rates], rad, in a chart that moves with the target
 //   predict  P(t|t-1) = A P A^T + Q, Q from the acceleration's density q: m^2/s^3 or rad^2/s^3
 //   update   W = P J^T S^-1, S = J P J^T + V                       (16, 17); V: detection's
-// Measured places are pixels, or metres if H is the identity. In the chart no angle wraps and poles
-// are ordinary places. With several weighted detections the result is the mixture's mean and
+// H_measured_from_world is a homography from the plane, or from directions in base, to measured
+// coordinates: pixels, or metres if H is the identity. In the chart no angle wraps, and poles are
+// ordinary places. With several weighted detections the result is the mixture's mean and
 // covariance. Fixed size; no allocation, no shared state. Details: docs/derivations.md.
 
 #include <optional>
@@ -16,12 +17,14 @@ namespace alidade {
 
 enum class TargetSpace { kPlane, kSphere };
 
+// In the units of its TargetSpace.
 struct TargetState {
-  Vector4<double> mean = Vector4<double>::Zero();  // sphere: the place is (0, 0)
+  Vector4<double> mean = Vector4<double>::Zero();  // s; on the sphere the place is (0, 0)
   Matrix4<double> cov = Matrix4<double>::Identity();
   Matrix3<double> R_base_from_chart = Matrix3<double>::Identity();  // the identity on the plane
 };
 
+// In measured coordinates: px or m.
 struct TargetMeasurement {
   Vector2<double> place = Vector2<double>::Zero();
   Matrix2<double> cov = Matrix2<double>::Identity();  // V(t)
@@ -41,9 +44,9 @@ struct Innovation {
   double density = 0;  // Gaussian, of the measurement, per unit of measured area
 };
 
-// The state after one measurement: at rest, with this sigma of velocity (m/s or rad/s). Empty if H
-// maps no place of the plane, or no direction, to the measurement (beyond the horizon, or H
-// singular).
+// The state after one measurement: at rest, with this sigma of velocity (m/s or rad/s). Empty if no
+// place of the plane, or no direction, is at the measurement: it is beyond the horizon, or H is
+// singular.
 [[nodiscard]] std::optional<TargetState> first_state(TargetSpace space,
                                                      const Matrix3<double>& H_measured_from_world,
                                                      const TargetMeasurement& measurement,
@@ -60,12 +63,12 @@ void predict_target(TargetSpace space, double dt_s, double acceleration_density,
 [[nodiscard]] Innovation innovation_of(const ExpectedPlace& expected,
                                        const TargetMeasurement& measurement);
 
-// weights[i] belongs to innovations[i]. Their sum is at most 1; the rest is the weight of the
-// prediction.
+// weights[i] belongs to innovations[i], i < count. The weights' sum is at most 1; the rest is the
+// weight of the prediction.
 void update_target(TargetSpace space, const ExpectedPlace& expected, const Innovation* innovations,
                    const double* weights, int count, TargetState* state);
 
-// The direction of a state on the sphere, in base.
+// The direction of a state on the sphere, in base, unit length.
 [[nodiscard]] Vector3<double> target_direction(const TargetState& state);
 
 struct AzimuthElevation {
@@ -73,8 +76,8 @@ struct AzimuthElevation {
   Vector4<double> value = Vector4<double>::Zero();
   Matrix4<double> cov = Matrix4<double>::Identity();  // of value
 };
-// Azimuth grows to the right and elevation upwards; base is forward-right-down. Empty within a
-// microradian of a pole, where azimuth is undefined.
+// Of a state on the sphere. Azimuth grows to the right and elevation upwards; base is
+// forward-right-down. Empty within a microradian of a pole, where azimuth is undefined.
 [[nodiscard]] std::optional<AzimuthElevation> azimuth_elevation(const TargetState& state);
 
 }  // namespace alidade

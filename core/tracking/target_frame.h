@@ -2,9 +2,9 @@
 // A tracker's input for one frame: time, the map from the world to measured coordinates, the region
 // in view, detections. The caller knows the camera; the tracker only gets a homography
 // (target_filter.h).
-// The view is inside all edges of a region of measured coordinates: edge . (x, y, 1) > 0. For
-// detections in pixels that is the picture, for those on the plane what the picture shows of it.
-// Parts that are hidden are cut off likewise.
+// The part of the measured coordinates that is in view: edge . (x, y, 1) > 0 for all edges. For
+// detections in pixels it is the image; for detections on the plane it is the part of the plane
+// that the image shows. Hidden parts are cut off by edges, too.
 
 #include <array>
 #include <cmath>
@@ -20,6 +20,7 @@ struct ViewRegion {
   int count = 0;  // 0: no limit
 };
 
+// An image of this size, for detections in pixels.
 [[nodiscard]] inline ViewRegion picture_region(double width_px, double height_px) {
   ViewRegion region;
   region.edges[0] = {1, 0, 0};
@@ -30,7 +31,8 @@ struct ViewRegion {
   return region;
 }
 
-// Probability that a place is in the region, as if the distances to its edges were independent.
+// Probability that a place is in the region; the distances to the edges are treated as independent.
+// place, cov: in measured coordinates.
 [[nodiscard]] inline double probability_in_view(const ViewRegion& region,
                                                 const Vector2<double>& place,
                                                 const Matrix2<double>& cov) {
@@ -45,12 +47,12 @@ struct ViewRegion {
 }
 
 struct TargetFrame {
-  double time_s = 0;
+  double time_s = 0;  // of exposure; any one clock for all frames
   Matrix3<double> H_measured_from_world = Matrix3<double>::Identity();
   ViewRegion view;
-  double false_alarm_density = 1e-7;  // per unit of measured area, of one frame
-  const TargetMeasurement* detections = nullptr;
-  int count = 0;
+  double false_alarm_density = 1e-7;  // false alarms of one frame per unit of measured area, > 0
+  const TargetMeasurement* detections = nullptr;  // borrowed for the call
+  int count = 0;                                  // of detections
 };
 
 }  // namespace alidade

@@ -1,8 +1,8 @@
 #pragma once
 // TargetTracker: targets from detections, frame by frame: predicted, associated, updated
 // (target_filter.h, joint_association.h), born and given up. Rules: docs/derivations.md. A late
-// frame is put in its place and those after it are repeated: the result is that of the right order,
-// and identities stay. A frame with any fault is refused as a whole, with its reason.
+// frame is put in its place and the frames after it are processed again: the result is that of the
+// right order, and identities stay. A frame with any fault is refused as a whole, with its reason.
 // Identities count from 1 and are never reused. Equal calls give equal results. For one thread. The
 // constructor takes all memory, no call allocates: about max_targets * (300 + 100
 // max_detections) + history_frames * (320 max_targets + 50 max_detections) bytes.
@@ -21,15 +21,15 @@ struct TargetTrackerOptions {
   AssociationMethod association = AssociationMethod::kExact;
   double acceleration_density = 0.5;   // m^2/s^3 or rad^2/s^3; 0.5: walkers
   double sigma_first_velocity = 2;     // m/s or rad/s
-  double detection_probability = 0.9;  // of a target in view, in (0, 1)
-  // Of a target's detection to be in its gate, in (0, 1). Wide, so that a target that turns sharply
-  // stays inside; the weights account for how unlikely that is.
+  double detection_probability = 0.9;  // that a target in view is detected, in (0, 1)
+  // Probability that a target's detection is in its gate, in (0, 1). The gate is wide, so that a
+  // target that turns sharply stays inside; a detection at its edge gets little weight.
   double gate_probability = 0.99999;
   int birth_hits = 3;          // sightings that confirm a target
-  int birth_looks = 5;         // the first looks, among which they must be
+  int birth_looks = 5;         // the number of first looks among which they must be
   double lose_after_s = 1;     // time in view without being seen
   double forget_after_s = 60;  // since last seen, in view or not; at least lose_after_s
-  double most_sigma = 30;      // m or rad, of the place along its worst direction
+  double most_sigma = 30;      // m or rad, of the place along its worst direction; beyond: given up
   double most_ahead_s = 0.5;   // limit of a frame's time after now
   double history_s = 2;        // limit of a late frame's delay
   int history_frames = 64;     // kept for late frames
@@ -41,7 +41,7 @@ struct TargetTrackerOptions {
 
 enum class FrameStatus {
   kTaken,
-  kTakenLate,            // put in its place, later frames repeated
+  kTakenLate,            // put in its place, later frames processed again
   kTooLate,              // beyond the history
   kInTheFuture,          // more than most_ahead_s after now
   kBadFrame,             // not finite, H singular, or density not positive
@@ -55,20 +55,20 @@ enum class FrameStatus {
 
 struct FrameAnswer {
   FrameStatus status = FrameStatus::kTaken;
-  int detection = -1;  // the detection at fault
+  int detection = -1;  // index of the detection at fault; -1: none is
   int steps = 0;       // frames processed: 1, more for a late one
 };
 
 struct Target {
   std::uint64_t identity = 0;  // 0: not confirmed
   TargetState state;           // at the newest frame's time
-  double born_s = 0;
-  double seen_s = 0;    // of the last frame that saw it
-  double unseen_s = 0;  // time in view without being seen
-  double in_view = 1;   // probability of being in view of the last frame
-  int detection = -1;   // of the last frame; the one that counts as seen; -1: none
-  int looks = 0;        // until confirmed
-  int hits = 0;
+  double born_s = 0;           // time of its first frame
+  double seen_s = 0;           // time of the last frame that saw it
+  double unseen_s = 0;         // duration in view without being seen, since then
+  double in_view = 1;          // probability of being in view of the last frame
+  int detection = -1;  // index in the last frame: the one by which it counts as seen; -1: none
+  int looks = 0;       // frames that had it in view, until it was confirmed
+  int hits = 0;        // of these, the ones that saw it
 };
 
 class TargetTracker {
@@ -76,12 +76,12 @@ class TargetTracker {
   // options must be valid.
   explicit TargetTracker(const TargetTrackerOptions& options);
 
-  // now_s: the clock of the frames' times.
+  // now_s: the present time on the clock of the frames' times.
   [[nodiscard]] FrameAnswer add(const TargetFrame& frame, double now_s);
 
   // In order of birth. Those without identity may be false alarms.
   [[nodiscard]] const std::vector<Target>& targets() const { return targets_; }
-  // Of the newest frame.
+  // Time of the newest frame.
   [[nodiscard]] double time_s() const { return time_s_; }
   // Births refused because there were max_targets.
   [[nodiscard]] std::int64_t births_refused() const { return births_refused_; }

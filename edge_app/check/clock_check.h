@@ -5,7 +5,7 @@
 //             count
 //   raw rate  host seconds per sender second: the median slope over half of the stream, without the
 //             filter's prior. It reveals stamps that are not a clock's; the filter, which assumes
-//             quartz, does not.
+//             quartz, does not reveal them.
 // Seconds. Pure functions; they allocate and do not throw, whatever the stamps hold.
 
 #include <cstdint>
@@ -25,13 +25,13 @@ enum class StampKind : std::uint8_t { kArrival, kSequence, kSender };
 struct ClockReport {
   StampKind kind = StampKind::kArrival;
   ClockState state = ClockState::kWarmingUp;
-  double rate_error = 0;   // host s per sender s, less 1, by the filter; 0 for counts
+  double rate_error = 0;   // host s per sender s, minus 1, by the filter; 0 for counts
   double period_s = 0;     // of one count, by the filter
   double sigma_s = 0;      // of the line at the last item
   ClockCounters counters;  // without restarts at a reconnection
   double delay_shift_s = 0;
   std::optional<Spread> lateness_s;
-  // The rate without the filter's prior, less 1, with its standard deviation: shows a broken clock.
+  // The raw rate minus 1, with its standard deviation: shows a broken clock.
   std::optional<double> raw_rate_error;
   double raw_rate_sigma = 0;
   // False: the stamps are not times (see judge_clock()), and the items' times are their arrivals.
@@ -39,7 +39,7 @@ struct ClockReport {
   bool counts = false;  // not usable because they count items
 };
 
-// What a clock needs of an item.
+// The stamps of one item.
 struct ClockedStamp {
   double receive_time_s = 0;
   std::optional<double> sender_time_s;
@@ -47,8 +47,8 @@ struct ClockedStamp {
   bool restarted = false;
 };
 
-// *time_s (if not null): each item's time by the final line. The receive time if there is no clock,
-// or no usable one.
+// *time_s (if not null): each item's time by the final line, or its receive time if there is no
+// usable clock.
 [[nodiscard]] ClockReport check_clock(const std::vector<ClockedStamp>& stamps,
                                       const ClockFilterOptions& options,
                                       std::vector<double>* time_s = nullptr);

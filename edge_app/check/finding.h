@@ -20,7 +20,7 @@ struct Finding {
 
 using Findings = std::vector<Finding>;
 
-// For people: label and text.
+// Lines of a report for people: label and text.
 using ReportLines = std::vector<std::pair<std::string, std::string>>;
 
 inline void add_problem(Findings* findings, std::string text) {

@@ -1,10 +1,10 @@
 #pragma once
 // Checks whether images show what landmarks need, and how the scene moves through them. No image is
 // kept.
-//   light    histogram of every 8th pixel of every 8th row. Dark: grey levels up to 16, black in
-//            video's narrow range. Saturated: the topmost level that occurs and the one below it,
-//            if it is 230 or more: there the range of the sensor or codec ends, whichever range it
-//            is.
+//   light    histogram of every 8th pixel of every 8th row. Dark: grey levels up to 16, which is
+//            black in video's narrow range. Saturated: the topmost level that occurs and the one
+//            below it, if the topmost is 230 or more: there the range of sensor or codec ends,
+//            narrow or full.
 //   texture  points that the start-up tracker (core/realtime) finds and follows: corners, with the
 //            contrast that a calibration and OE mode demand at their start
 //   motion   px, the tracker's shift of the image's centre from one image to the next
@@ -23,7 +23,7 @@
 
 namespace alidade {
 
-// By how much the scene at the image's centre moved from frame `from` to frame `to`.
+// By how much the scene at the image's centre moved between two frames, by their numbers.
 struct ImageShift {
   std::int64_t from = 0;
   std::int64_t to = 0;
@@ -42,7 +42,7 @@ struct ImageLight {
 
 struct ImageNeeds {
   std::string source;
-  bool landmarks = true;  // OE mode; in PT mode images that show nothing are advice only
+  bool landmarks = true;  // OE mode; in PT mode images without texture are advice only
 };
 
 struct ImageReport {

@@ -2,8 +2,8 @@
 // Checks roughly, from the image's motion and the telemetry's, whether pan and tilt have the right
 // signs, and which focal length and clock offset fit. The clock offset is the one that explains
 // most of the image's motion (motion_fit.h). A sign is stated only if the axis moved the image by 2
-// px rms over 0.3 s (the tracker errs by a tenth of that) in eight baselines or more, if this sign
-// explains at least 80 % of that motion, and if with the other sign no offset explains 4/5 as much.
+// px rms over 0.3 s (the tracker errs by 0.2 px) in eight baselines or more, if this sign explains
+// at least 80 % of this motion, and if with the other sign no offset explains 4/5 as much.
 // Reasons and the other rules: docs/derivations.md.
 // Good to some percent. Radians, seconds, px. Pure; allocates.
 
@@ -18,11 +18,11 @@
 namespace alidade {
 
 struct MotionNeeds {
-  std::string source;          // of pan and tilt
-  std::string video;           // of the image
-  int image_width_px = 0;      // 0: unknown
-  double focal_length_px = 0;  // 0: unknown
-  std::string focal_length_from;
+  std::string source;             // of pan and tilt
+  std::string video;              // of the image
+  int image_width_px = 0;         // 0: unknown
+  double focal_length_px = 0;     // 0: unknown
+  std::string focal_length_from;  // where focal_length_px comes from, for people
   bool calibrated = false;
   double clock_offset_s = 0;  // of the calibration, else 0
   // How to reverse a sign in the configuration: "set pan_tilt.tilt_positive: down".

@@ -2,10 +2,10 @@
 // Fits the image's motion to the head's, with nominal axes and small distortion at the centre.
 //
 // Over about 0.3 s the image's centre moves by f p, p = (-cos(tilt) dpan, dtilt): the scene moves
-// left when the camera turns right, and down when it turns up. m: motions in the video, px; p:
-// those of the head at a clock offset d. For an axis a of the image:
+// left when the camera turns right, and down when the camera turns up. m: motions in the video, px;
+// p: motions of the head at a clock offset d. For an axis a of the image:
 //   s_a(d) = sum(m_a p_a) / sum(p_a^2)      scale: f, or -f if the sign of the axis is wrong
-//   e_a(d) = sum(m_a p_a)^2 / sum(p_a^2)    the part of sum(m_a^2) that it explains
+//   e_a(d) = sum(m_a p_a)^2 / sum(p_a^2)    the part of sum(m_a^2) that the head explains
 // Radians, seconds, px. Pure; allocates.
 
 #include <array>
@@ -29,7 +29,7 @@ struct TimedShift {
 class HeadPath {
  public:
   explicit HeadPath(const std::vector<PanTiltSample>& samples);
-  // Pan and tilt, interpolated. False: there are no two samples close enough around the time.
+  // Pan and tilt, interpolated, rad. False: there are no two samples close enough around the time.
   [[nodiscard]] bool at(double time_s, Vector2<double>* angle) const;
   [[nodiscard]] std::size_t samples() const { return times_.size(); }
   // rad, the larger of the two axes' ranges. Needs a sample.
@@ -44,7 +44,7 @@ class HeadPath {
 // half, so about half of them are independent.
 [[nodiscard]] std::vector<TimedShift> over_baseline(const std::vector<TimedShift>& shifts);
 
-// px, how far the image's centre came from where it began, over joined shifts.
+// px; how far the image's centre came from its first place, over joined shifts.
 [[nodiscard]] double image_range(const std::vector<TimedShift>& shifts);
 
 // Sums over all motions, of one axis of the image with one axis of the head.
@@ -72,8 +72,8 @@ struct MotionFit {
 [[nodiscard]] double crossed(const MotionFit& fit);
 
 // Fits at clock offsets around a given one: a second to both sides, then twice as far each time, as
-// long as none explains the motion well or the best lies at an end. calibrate() searches likewise,
-// but looks at the ends only.
+// long as no offset explains the motion well or the best one lies at an end. calibrate() widens its
+// search only if the best offset lies at an end.
 struct MotionSearch {
   // Leaves out offsets that cover less than half of the motions, or fewer than least_times
   // baselines without overlap.
@@ -82,7 +82,7 @@ struct MotionSearch {
 
   std::vector<double> offsets;  // s, ascending
   std::vector<MotionFit> fits;
-  // The motion is explained well, and not at an end, beyond which it might be explained better.
+  // The motion is explained well, by an offset that is not at an end of the search.
   bool sure = false;
 
   // Index of the best fit; the first of equals.

@@ -1,8 +1,9 @@
 #pragma once
 // Checks whether pictures are sent again. A frame rate converter, a night mode or a grabber repeats
-// a picture if it has no new one, so the rate is not what it seems. Equal pictures of a camera at
-// rest say nothing. So a frame is judged only if the head moved the image by kTurning_px from
-// kAbout_s before to kAbout_s after it. Radians, seconds, px. Pure; allocates.
+// a picture if it has no new one, so the true rate is lower than the frames' rate. Equal pictures
+// of a camera at rest show nothing. So a frame is judged only if the head moved the image by
+// kTurning_px from kAbout_s before the frame to kAbout_s after it. Radians, seconds, px. Pure;
+// allocates.
 
 #include <cstddef>
 #include <optional>

@@ -11,8 +11,8 @@
 //   resolution  of each axis (stale_repeats.h)
 //   bounds      latest - earliest of each sample: how well its time is known
 //   stale       repeats of an old angle while the head turned (stale_repeats.h), as a share of all
-//               samples while it turned. How long an angle was repeated, and when the next one
-//               came, give limits for max_repeat_s.
+//               samples while it turned. Two times give limits for max_repeat_s: how long an angle
+//               was repeated, and when the next angle came.
 
 #include <array>
 #include <optional>

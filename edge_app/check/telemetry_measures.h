@@ -1,7 +1,6 @@
 #pragma once
-// Those numbers of a TelemetryReport that need more than counting: each axis, the samples while the
-// head turned, and the age of the newest known angle. Their meaning: telemetry_check.h. Pure;
-// allocates.
+// The numbers of a TelemetryReport that need more than counting: each axis, the samples while the
+// head turned, and the age of the newest known angle. Meanings: telemetry_check.h. Pure; allocates.
 
 #include <optional>
 #include <vector>

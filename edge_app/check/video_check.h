@@ -4,7 +4,7 @@
 //   intervals  of the sender's times, else of the receive times. Their median is the period, their
 //              deviation the jitter that remains without the arrival.
 //   losses     gaps in the sequence numbers; else in the sender's times if these lie on a steady
-//              grid. The latter do not show whether a frame was lost or left out by the camera.
+//              grid. Gaps in times do not show whether a frame was lost or left out by the camera.
 // No interval and no loss reaches across a reconnection.
 // Seconds. Pure functions; they allocate and do not throw, whatever the stamps hold.
 

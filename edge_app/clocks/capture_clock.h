@@ -1,8 +1,8 @@
 #pragma once
 // CaptureClock: the capture time of each item of a stream, by a ClockFilter over the sender's
-// clock, else over the sequence numbers. A stream with neither gets no estimate: the caller then
-// uses the receive time. The same holds for up to kUntold items in a row that lack stamps in a
-// stream that has them. Restarts at a reconnection, and when the kind of stamps changes.
+// clock, else over the sequence numbers. An item with neither gets no estimate: the caller then
+// uses the receive time. In a stream with stamps, up to kUntold items in a row may lack them.
+// Restarts at a reconnection, and when the kind of stamps changes.
 // Seconds, host clock. Fixed memory, no allocation, one thread.
 
 #include <cstdint>

@@ -1,12 +1,12 @@
 #pragma once
-// FrameClock: the capture time of each frame of a live stream, and whether that time is known. A
+// FrameClock: the capture time of each frame of a live stream, and whether this time is known. A
 // frame may have waited for an unknown time before it arrived and was stamped: behind a relay or a
-// network that stood still, in a cache, or in the socket of this process. Its time comes from the
-// sender's clock, else from sequence numbers, else from arrivals alone (receipt_clock.h,
-// uneven_arrivals.h). Sequence numbers give way to the driver's stamp (stamped_at) of a frame that
-// they put elsewhere. Time stamps that run at a wrong rate, or count pictures, are left out.
-// wait_for_pace false (no arrivals, or a recording read as a source): CaptureClock alone. Seconds.
-// Fixed memory, no allocation, one thread. Derivation: docs/derivations.md.
+// network that stood still, in a cache, or in the socket of this process. The frame's time comes
+// from the sender's clock, else from sequence numbers, else from arrivals alone (receipt_clock.h,
+// uneven_arrivals.h). If the sequence numbers contradict a frame's driver stamp (stamped_at), the
+// stamp counts. Time stamps that run at a wrong rate, or count pictures, are left out. If
+// wait_for_pace is false (no arrivals, or a recording read as a source): CaptureClock alone.
+// Seconds. Fixed memory, no allocation, one thread. Derivation: docs/derivations.md.
 
 #include <algorithm>
 #include <cmath>
@@ -31,17 +31,17 @@ struct FrameTime {
   ClockEstimate clock;
   bool known = true;   // false: clock.time_s may be late by any amount
   bool of_use = true;  // false: of no use for calibration, and later frames do not improve it
-  // s, sum of the steps of the least delay. The receive time contains it, the line does not.
+  // Sum of the steps of the least delay. The receive time contains this sum, the line does not.
   double delay_shift_s = 0;
-  // s, by how much frames leave the line. Included in clock.sigma_s; common to neighbouring frames.
+  // By how much frames leave the line. Included in clock.sigma_s; common to neighbouring frames.
   double off_line_s = 0;
   double wander_s = 0;  // the same if frames leave the line again and again, else 0
-  // s, at a restart or step of the clock: by how much the new line may differ from the old one,
-  // whether the delay or the stamps moved.
+  // At a restart or step of the clock: by how much the new line may differ from the old one. The
+  // cause may be the delay or the stamps.
   double moved_s = 0;
   bool stamps_left_out = false;                 // the sender's stamps are not used: wrong rate
-  std::optional<double> stamp_rate_error = {};  // rate less one, in the first such frame
-  bool stamps_count = false;                    // in that frame: the stamps count pictures
+  std::optional<double> stamp_rate_error = {};  // rate minus 1; in the first such frame only
+  bool stamps_count = false;                    // likewise: the stamps count pictures
 };
 
 class FrameClock {

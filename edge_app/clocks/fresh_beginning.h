@@ -1,6 +1,6 @@
 #pragma once
-// begins_fresh(): whether the first frames of a recording arrived without a long wait. In a live
-// stream nobody knows (frame_clock.h). In a recording the later frames show it. Seconds. Pure;
+// begins_fresh(): whether the first frames of a recording arrived without a long wait. The later
+// frames of the recording show it; in a live stream nobody knows (frame_clock.h). Seconds. Pure;
 // allocates.
 
 #include <algorithm>
@@ -13,9 +13,9 @@
 
 namespace alidade {
 
-// stamps: in order of arrival. With sender times: the first frame is later than the least late one
-// of the first kLook_s by no more than jitter. Without: there is no burst among the arrivals of the
-// first kLook_s.
+// stamps: in order of arrival. With sender times, true if the first frame is later than the least
+// late frame of the first kLook_s by no more than jitter. Without sender times, true if there is no
+// burst among the arrivals of the first kLook_s.
 [[nodiscard]] inline bool begins_fresh(const std::vector<FrameStamp>& stamps) {
   constexpr double kLook_s = 10;
   constexpr double kBurst = 0.4;  // of the usual interval

@@ -1,12 +1,13 @@
 #pragma once
-// ReceiptClock: the capture times of a stream of which only arrivals are known. They are upper
-// limits.
+// ReceiptClock: the capture times of a stream of which only arrivals are known. An arrival is an
+// upper limit of the capture time.
 //
-// Items come one a period, so their count times the period is a clock, which can only be slow (by
-// what was lost). An item that arrives L later than this clock says may be up to L old, or fresh
-// behind a loss. Up to kLongest_s its time is the middle of what is possible, and sigma covers it.
-// Beyond, its age is unknown until the count has caught up with the arrivals, or the arrivals show
-// their pace (ArrivalPace). How the period is learnt: docs/derivations.md.
+// One item comes each period, so the count of items times the period is a clock. This clock can
+// only be slow, by the lost items. An item that arrives L later than the clock says may be up to L
+// old, or fresh behind a loss. If L is at most kLongest_s, the item's time is the middle of the
+// possible ones, and sigma covers them. If L is larger, the item's age is unknown until the count
+// has caught up with the arrivals, or the arrivals show their pace (ArrivalPace). How the period is
+// learnt: docs/derivations.md.
 // Seconds of the host's clock. Fixed memory, no allocation, one thread.
 
 #include <algorithm>
@@ -30,7 +31,7 @@ class ReceiptClock {
   // stamp_sigma_s: of the receive time of a punctual item, s.
   explicit ReceiptClock(double stamp_sigma_s) : stamp_sigma_s_(stamp_sigma_s) {}
 
-  // Call at a (re)connection. The period of the connection before is kept.
+  // To be called at a (re)connection. The period of the connection before is kept.
   void restart() {
     began_ = paced_ = known_ = false;
     arrivals_.restart();

@@ -1,9 +1,9 @@
 #pragma once
 // UnevenArrivals: the capture times of a live stream that is known by its arrivals only, and whose
-// camera leaves pictures out. So its pictures do not measure time; receipt_clock.h assumes that
-// they do. A picture that comes after more than the usual interval has waited for the excess at
-// most, or it follows a missing one. Its time is the middle of what is possible, and sigma covers
-// it. Ages beyond kLongest_s are unknown, as are those at a connection's beginning. What the next
+// camera leaves pictures out. The count of such pictures is no clock, as receipt_clock.h needs it.
+// A picture that comes after more than the usual interval has waited for the excess at most, or it
+// follows a missing picture. Its time is the middle of the possible ones, and sigma covers them.
+// Ages beyond kLongest_s are unknown, and so are ages at a connection's beginning. What the next
 // pictures show: docs/derivations.md. Seconds of the host's clock. Fixed memory, no allocation, one
 // thread.
 
@@ -21,7 +21,8 @@ class UnevenArrivals {
 
   explicit UnevenArrivals(double stamp_sigma_s) : stamp_sigma_s_(stamp_sigma_s) {}
 
-  // Call at a (re)connection. The usual interval is kept. interval_s: a first guess of it, or 0.
+  // To be called at a (re)connection. The usual interval is kept. interval_s: a first guess of the
+  // usual interval; 0: none.
   void restart(double interval_s = 0) {
     if (interval_s > 0) usual_s_ = interval_s;
     began_ = false;

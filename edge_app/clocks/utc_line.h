@@ -27,7 +27,7 @@ class UtcLine {
     [[nodiscard]] bool agrees() const { return std::abs(late_s) <= kAgrees_s; }
   };
 
-  // Call for each frame with a sender's clock, in order of arrival.
+  // To be called for each frame with a sender's clock, in order of arrival.
   void watch(const FrameStamp& stamp) {
     if (!tells(stamp)) return;
     const double ahead_s = *stamp.sender_utc_s - *stamp.sender_time_s;
@@ -40,8 +40,8 @@ class UtcLine {
     seen_s_ = stamp.receive_time_s;
   }
 
-  // The connection has ended. filter: its line; null if there is none to be believed. off_line_s:
-  // by how much frames left it.
+  // The connection has ended. filter: has its line; null if no line is to be believed. off_line_s:
+  // by how much frames left the line.
   void end_connection(const ClockFilter<>* filter, double off_line_s) {
     if (filter != nullptr && filter->state() == ClockState::kLocked && steady_since_s_ &&
         seen_s_ - *steady_since_s_ >= kProven_s) {
@@ -50,7 +50,7 @@ class UtcLine {
     steady_since_s_.reset();
   }
 
-  // What was kept, or its connection, is wrong.
+  // Forgets the line that was kept: it is wrong, or of another connection.
   void forget() {
     kept_.reset();
     steady_since_s_.reset();

@@ -14,17 +14,17 @@ struct CalibrateOptions {
   // Device units; readings that differ by no more are one zoom. Empty: found from their jitter.
   std::optional<double> zoom_tolerance;
   bool json = false;
-  int passes = 2;     // how often tracks are sought in the video
+  int passes = 2;     // how often tracks are sought in the video: 1 or 2
   std::string prior;  // a lens.yaml; empty: none
-  // Priors: VALUE, or VALUE,SIGMA, or "free"; empty: the estimator's default.
+  // Priors: VALUE, or VALUE,SIGMA, or "free"; empty: the estimator's default. px, 1, 1, s/row, s.
   std::string focal_length;
   std::string aspect;
   std::string radial_distortion;
   std::string line_delay;
   std::string clock_offset;
-  std::optional<double> scale_sigma;
-  std::optional<double> centre_sigma_px;  // empty: kUsualCentreShare of the width
-  std::optional<double> angle_accuracy_deg;
+  std::optional<double> scale_sigma;         // of pan_scale and tilt_scale; empty: their default
+  std::optional<double> centre_sigma_px;     // empty: kUsualCentreShare of the width
+  std::optional<double> angle_accuracy_deg;  // CalibrationOptions::angle_accuracy_rad; empty: 0
 };
 
 // Calibrates from one recording, or from all of them together if they differ in zoom. Returns the

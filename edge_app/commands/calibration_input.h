@@ -18,8 +18,8 @@ struct CalibrationJob {
   std::string recording;  // directory
   CalibrationInput input;
   CalibrationOptions options;
-  KnownCamera known;  // priors from a lens.yaml, in addition to the options
-  CalibrationValues guess;
+  KnownCamera known;               // priors from a lens.yaml, in addition to the options
+  CalibrationValues guess;         // what the recording states of the camera, in guess.yaml
   bool tracks_from_video = false;  // input.observations must still be found in the video
   // Frames without an observation; set where tracks were found in the video.
   std::optional<UntrackedFrames> untracked;
@@ -28,17 +28,17 @@ struct CalibrationJob {
   // The movement of the zoom from the dwell of the job before to this one. Set if there are tracks
   // of it, or a video.
   std::optional<ZoomMovement> movement;
-  // The frames in which the tracks of `movement` must still be found. Empty if it has tracks, or
-  // takes longer than kLongestMovement_s.
+  // The frames in which the tracks of `movement` must still be found. No frames if `movement` has
+  // tracks, or takes longer than kLongestMovement_s.
   CalibrationInput movement_pictures;
 };
 
-// One job for the whole recording. If its zoom moves: one job for each dwell, a time of at least
-// kLeastStretch_s in which the reading stands still. Frames within kZoomMargin_s of either end of a
-// dwell are left out, as the offset between the clocks of image and telemetry is not known yet. The
-// options hold what the recording states of its time stamps and scales. zoom_tolerance: device
-// units; readings that differ by no more are one zoom; empty: found from their jitter. Throws
-// CommandError.
+// One job for the whole recording; if its zoom moves, one job for each dwell. A dwell is a time of
+// at least kLeastStretch_s in which the reading stands still. Frames within kZoomMargin_s of either
+// end of a dwell are left out, as the offset between the clocks of image and telemetry is not known
+// yet. The options hold what the recording states of its time stamps and scales. zoom_tolerance:
+// device units; readings that differ by no more are one zoom; empty: found from their jitter.
+// Throws CommandError.
 inline constexpr double kLeastStretch_s = 6;
 inline constexpr double kZoomMargin_s = 1;
 [[nodiscard]] std::vector<CalibrationJob> load_calibration_jobs(

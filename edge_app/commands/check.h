@@ -6,12 +6,13 @@
 namespace alidade {
 
 struct CheckOptions {
-  std::string config;
-  double duration_s = 10;
+  std::string config;      // path of alidade.yaml
+  double duration_s = 10;  // from the first item of each link on
   bool json = false;
 };
 
-// Checks the configuration and what its links send. Returns the exit code; throws CommandError.
+// Checks the configuration and what its links send. Returns the exit code: kExitFailed if a finding
+// is a problem. Throws CommandError.
 [[nodiscard]] int check_links(const CheckOptions& options);
 
 }  // namespace alidade

@@ -15,6 +15,7 @@
 
 namespace alidade {
 
+// Its references are borrowed.
 struct CheckReport {
   std::string configuration;  // path
   const PublishedCalibration& calibration;
@@ -33,7 +34,7 @@ struct CheckReport {
 // True if no finding is a problem.
 [[nodiscard]] bool is_ok(const Findings& findings);
 
-// Ends with a line feed.
+// One line, with a line feed at its end.
 [[nodiscard]] std::string check_json(const CheckReport& report);
 
 }  // namespace alidade

@@ -16,8 +16,8 @@
 
 namespace alidade {
 
-// A stream may begin with a burst of pictures that a relay has stored. Losses in that time are
-// counted separately.
+// A stream may begin with a burst of pictures that a relay has stored. Losses in the first kStart_s
+// are counted separately.
 inline constexpr double kStart_s = 2;
 
 struct Connection {
@@ -27,13 +27,13 @@ struct Connection {
   // What the connected source waited for last before its first item; empty: nothing.
   std::string waited;
   std::vector<std::string> notes;  // what the source found out about its device
-  std::string name;
+  std::string name;                // of the source
 };
 
 // The last image that was examined.
 struct LastPicture {
   Frame frame;
-  // px/s, of the image's content at its centre, since the image before; empty: not known.
+  // Motion of the scene at the image's centre since the image before; empty: not known.
   std::optional<Vector2<double>> shift_px_s;
 };
 
@@ -42,11 +42,11 @@ struct Measured {
   Connection pan_tilt;
   std::vector<CheckedFrame> frames;
   std::vector<PanTiltSample> samples;
-  std::vector<double> delivered_s;  // of each sample: when the source delivered it
+  std::vector<double> delivered_s;  // of each sample: CLOCK_MONOTONIC when the source delivered it
   FrameSourceCounters counters;
   FrameSourceCounters counters_at_start;  // after the first kStart_s
   ImageReport images;
-  std::optional<LastPicture> last;
+  std::optional<LastPicture> last;  // empty: no image came
 };
 
 // Reads each configured stream for duration_s from its first item on. While the video waits for a

@@ -1,6 +1,6 @@
 #pragma once
-// Whether `run` can use the configured scene map, and where the last picture looks according to it.
-// Telemetry is not used, so the answer does not depend on whether the bases of map and camera
+// Whether `run` can use the configured scene map, and where the last picture looks according to the
+// map. Telemetry is not used, so the answer does not depend on whether the bases of map and camera
 // agree.
 
 #include <cstdint>
@@ -21,9 +21,9 @@ struct SceneCheck {
   std::string error;
   std::int64_t keyframes = 0;
   std::int64_t landmarks = 0;
-  std::int64_t frame = 0;  // of the picture
-  std::optional<Localization> found;
-  Mechanics<double> mechanics;
+  std::int64_t frame = 0;             // number of the picture
+  std::optional<Localization> found;  // empty: not tried
+  Mechanics<double> mechanics;        // by which angles follow from the orientation
   Findings findings;
 };
 

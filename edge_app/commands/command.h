@@ -33,7 +33,7 @@ Config require_config(const std::string& path);
 // CommandError.
 VideoConfig require_video_config(const std::string& path);
 
-// With its zoom curve, without a map. Throws CommandError.
+// The calibration in a file, with its zoom curve, without a map. Throws CommandError.
 PublishedCalibration require_calibration_file(const std::string& path);
 
 // The calibration of calibration.file. The data sheet's if no file is named, or if calibration.auto
@@ -47,18 +47,20 @@ std::shared_ptr<const PlaneEstimate> require_plane(const Config& config);
 // deviations large enough to allow for the real ones.
 Calibration data_sheet_calibration(const CameraConfig& camera);
 
-// With the noise that the configuration, or the noise.yaml of a recording, states.
+// Options of a real-time step with this calibration. The noise is what the configuration, or the
+// noise.yaml of a recording, states.
 OrientationStepOptions step_options(const Config& config, const PublishedCalibration& calibration);
 OrientationStepOptions step_options(const RecordingNoise& noise,
                                     const PublishedCalibration& calibration);
 
-// decode: frames have images. copy_to: the video stream is copied to this file; empty: none.
+// Never null. decode: frames have images. copy_to: the video stream is copied to this file; empty:
+// to none.
 std::unique_ptr<FrameSource> make_frame_source(const VideoConfig& config, bool decode,
                                                const std::string& copy_to = "");
 std::unique_ptr<PanTiltSource> make_pan_tilt_source(const PanTiltConfig& config);
 
-// s, how much longer than its own timeout a live source may take to its first item, for the login
-// and a first key frame. A source reports earlier than that what it waits for.
+// A live source may take so much longer than its own timeout to its first item, for the login and a
+// first key frame. The source reports earlier what it waits for.
 inline constexpr double kConnectSlack_s = 4;
 
 // One line: the link is connected and nothing came.
@@ -67,8 +69,8 @@ std::string nothing_came(const std::string& source, double wait_s);
 // Logs the frames that a live source received damaged or had to drop, if any.
 void log_source_losses(const FrameSource& source);
 
-// The time stamps of a recording belong to its own clock, so live and recorded streams cannot be
-// mixed.
+// Whether the streams are those of a recording. The time stamps of a recording belong to its own
+// clock, so live and recorded streams cannot be mixed.
 bool is_recording(const Config& config);
 
 bool is_terminal(int descriptor);

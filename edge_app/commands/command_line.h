@@ -1,6 +1,6 @@
 #pragma once
-// The command line: sub-commands, their options, help. Only this source includes the parser, which
-// takes longer to compile than most sub-commands.
+// The command line: sub-commands, their options, help. Only command_line.cpp includes the parser,
+// which takes longer to compile than most sub-commands.
 
 namespace alidade {
 

@@ -1,6 +1,6 @@
 #pragma once
-// The calibration with which `alidade run` begins, and the objects that go on to calibrate. It
-// begins with a stored calibration, otherwise with the data sheet. Only this file makes that
+// The calibration with which `alidade run` begins, and the objects that go on to calibrate. `run`
+// begins with a stored calibration, or without one with the data sheet's. Only this file makes this
 // choice.
 
 #include <memory>
@@ -14,7 +14,8 @@
 
 namespace alidade {
 
-// Calibrates the camera while it runs; both are null if nothing is to be calibrated.
+// Calibrates the camera while it runs; both are null if nothing is to be calibrated. `calibration`
+// borrows `store`.
 struct Calibrating {
   std::unique_ptr<CalibrationStore> store;
   std::unique_ptr<SelfCalibration> calibration;

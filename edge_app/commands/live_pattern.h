@@ -5,8 +5,8 @@
 // lost camera, as `record` does.
 //
 // Threads: one reads and stamps the frames, the other searches the latest image for the pattern. So
-// the search neither delays time stamps nor makes a source drop frames. At most two images are
-// kept.
+// the search neither delays time stamps nor makes a source drop frames. At most two images are in
+// memory.
 
 #include <string>
 

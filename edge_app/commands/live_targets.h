@@ -13,7 +13,7 @@
 
 namespace alidade {
 
-// Null if no network is configured. Throws CommandError if its files cannot be used.
+// Null if no network is configured. Throws CommandError if the network's files cannot be used.
 [[nodiscard]] std::unique_ptr<NetworkDetector> load_network(
     const std::optional<NetworkFiles>& files);
 
@@ -29,8 +29,9 @@ class LiveTargets {
   [[nodiscard]] DetectorTap* detector_tap() { return tap_ ? &*tap_ : nullptr; }
   // Only if detector_tap() is not null.
   [[nodiscard]] DetectorsReport detectors() const;
+  // Starts the detectors' thread, if there is one.
   void start();
-  // Must be called before the objects are destroyed that new lines wake.
+  // To be called while the objects that new lines wake still exist.
   void stop();
 
  private:

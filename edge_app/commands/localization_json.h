@@ -9,9 +9,9 @@
 
 namespace alidade {
 
-// Adds "status" and "matches". With kOk, also adds angles, orientation and lens at the time when
-// "reference_row" was exposed, their standard deviations, and what changed from the first row to
-// the last: the turn of the camera in its own frame (rad) and log f.
+// Adds "status" and "matches" to the object *json. With kOk, also adds angles, orientation and lens
+// at the time when "reference_row" was exposed, their standard deviations, and the change from the
+// first row to the last: the turn of the camera in its own frame (rad), and the change of log f.
 void add_localization(const Localization& found, const Mechanics<double>& mechanics,
                       nlohmann::ordered_json* json);
 

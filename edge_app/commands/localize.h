@@ -8,10 +8,10 @@
 namespace alidade {
 
 struct LocalizeCommand {
-  std::string map;
+  std::string map;                    // a scene map's file
   std::vector<std::string> pictures;  // files, or directories of recordings
-  // Gives f for a zoom reading, clock offset and axes; empty: telemetry has nominal axes and gives
-  // no focal length.
+  // A file that gives f for a zoom reading, clock offset and axes. Empty: the axes are nominal, and
+  // the zoom reading gives no focal length.
   std::string calibration;
   bool no_telemetry = false;
   int every = 1;  // use each n-th frame of a recording

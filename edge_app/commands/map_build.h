@@ -8,14 +8,14 @@
 namespace alidade {
 
 struct MapBuildCommand {
-  std::vector<std::string> recordings;
-  std::string map;           // the file to write
-  std::string add;           // a map whose keyframes are added; empty: none
+  std::vector<std::string> recordings;  // directories
+  std::string map;                      // the file to write
+  std::string add;                      // a map whose keyframes are added; empty: none
   std::string calibration;   // empty: <first recording>/alidade/calibration.yaml, if it exists
-  std::string focal_length;  // px, or WIDE:TELE
+  std::string focal_length;  // px, or WIDE:TELE; empty: the calibration's, or found
   int keyframes = 300;       // at most
   bool no_telemetry = false;
-  bool largest_part = false;
+  bool largest_part = false;  // MapBuildOptions::largest_part
   bool json = false;
 };
 

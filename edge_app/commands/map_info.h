@@ -6,7 +6,7 @@
 namespace alidade {
 
 struct MapInfoCommand {
-  std::string map;
+  std::string map;  // a scene map's file
   bool json = false;
 };
 

@@ -1,6 +1,6 @@
 #pragma once
-// The pictures of a recording, with what its tables and a calibration state for each. Scene maps
-// are built from them, and they are localized in scene maps.
+// The pictures of a recording, each with what the recording's tables and a calibration say of it.
+// Scene maps are built from such pictures, and such pictures are localized in scene maps.
 
 #include <functional>
 #include <optional>
@@ -20,13 +20,15 @@ class FocalLengthKnowledge {
  public:
   // Nothing is known: one lens that does not zoom.
   FocalLengthKnowledge() = default;
-  // From a calibration; for all readings if it has a curve.
+  // From a calibration. With a curve, f follows the reading within the curve's range; outside of it
+  // nothing is known. With an empty curve, the calibration's f holds for every reading.
   FocalLengthKnowledge(const Calibration& calibration, const ZoomCurve& curve);
-  // From a data sheet: one focal length, or log f linear in the reading between the two ends.
+  // From a data sheet: one focal length; or log f linear in the reading, beyond the two ends as
+  // between them. The end readings (device units) must differ.
   explicit FocalLengthKnowledge(double px);
   FocalLengthKnowledge(double wide_px, double tele_px, double wide_reading, double tele_reading);
 
-  // Empty: not known, or a reading is needed and missing.
+  // zoom: the reading, device units. Empty: not known, or a reading is needed and missing.
   [[nodiscard]] std::optional<FocalLengthPrior> at(const std::optional<double>& zoom) const;
   [[nodiscard]] bool needs_reading() const { return needs_reading_; }
 
@@ -36,7 +38,8 @@ class FocalLengthKnowledge {
 };
 
 // From the command line: --focal-length PX or WIDE:TELE takes precedence over the calibration.
-// readings: those of all recordings. Throws CommandError.
+// focal_length: the option's value; empty: not given. calibration: may be null. readings: those of
+// all recordings; the least one belongs to WIDE, the greatest one to TELE. Throws CommandError.
 [[nodiscard]] FocalLengthKnowledge focal_length_knowledge(const std::string& focal_length,
                                                           const Calibration* calibration,
                                                           const ZoomCurve& curve,
@@ -47,8 +50,9 @@ struct MapRecording {
   std::string directory;
   RecordingInfo info;
   std::vector<FrameStamp> frames;
-  std::vector<PanTiltSample> telemetry;  // by time; empty: none, or not wanted
+  std::vector<PanTiltSample> telemetry;  // by latest_time_s; empty: none, or not wanted
 
+  // Those of the samples that have one, device units, in order of time.
   [[nodiscard]] std::vector<double> zoom_readings() const;
 };
 
@@ -56,24 +60,28 @@ struct MapRecording {
 [[nodiscard]] MapRecording load_map_recording(const std::string& directory, bool with_telemetry);
 
 // What is known of one frame. If `calibration` is null, the mechanics are nominal and the clock
-// offset is 0.
+// offset is 0. If the frame lies outside the telemetry's time span, the view has no telemetry, no
+// zoom and no rates.
 [[nodiscard]] MapView map_view(const MapRecording& recording, const FrameStamp& frame,
                                const Calibration* calibration, const FocalLengthKnowledge& known);
 
-// Bounds the error of the camera's motion that telemetry gives for the read-out of one frame: by
-// how much its rates differ about that time. The time window is wider without a calibration, as the
-// clock offset is then not known. view: of this frame. line_delay: s/row; 0: not known, then the
-// rates only give a bound of the motion.
+// Bounds the error of the motion that telemetry gives for one frame's read-out: the read-out time
+// times the largest difference between the view's rates and the rates of telemetry's intervals
+// around the frame. Around means 0.05 s with a calibration, 1 s without, as the clock offset is not
+// known then. view: of this frame. line_delay: s/row; 0: not known; the result then bounds the
+// motion itself, over 30 ms. kUnknownMotion: the frame has too little telemetry around it.
 [[nodiscard]] MotionDoubt motion_doubt(const MapRecording& recording, const FrameStamp& frame,
                                        const Calibration* calibration,
                                        const FocalLengthKnowledge& known, const MapView& view,
                                        double line_delay);
 
-// Calls use(frame, image) for the pictures of these frames. frames: increasing indices into
-// recording.frames. A frame without a picture is skipped. Throws CommandError.
+// Calls use(index, image) for the pictures of these frames. frames: increasing indices into
+// recording.frames; use gets one of them. A frame without a picture is skipped. The image is lent
+// for the call. Throws CommandError.
 void for_each_picture(const MapRecording& recording, const std::vector<std::size_t>& frames,
                       const std::function<void(std::size_t, const ImageView&)>& use);
 
+// The features of a whole image.
 [[nodiscard]] inline FeatureSet features_of(const FeatureDetector& detector,
                                             const ImageView& image) {
   return detector.find(image.luma, image.width, image.height, image.stride);

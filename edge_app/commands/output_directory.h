@@ -12,14 +12,14 @@
 namespace alidade {
 
 // given: the argument of -o. If it is empty: `alidade` in the recording's directory, or beside the
-// recording if that is a file.
+// recording if the recording is a file.
 [[nodiscard]] std::string output_path(const std::string& given, const std::string& recording);
 
 // A lock on an output file, held while a command works. Another command that would write the file
-// fails and names the holder. A `run` that stores its calibrations in that file holds the same
-// lock. Makes the file's folder. Leaves nothing of its own behind, even if SIGINT, SIGTERM or
-// SIGHUP ends the program. Where the file system has no locks, none is taken. Only one object may
-// exist at a time.
+// fails and names the holder. A `run` that stores its calibrations in the same file holds the same
+// lock. The constructor makes the file's folder. Nothing of the lock stays behind, not even if
+// SIGINT, SIGTERM or SIGHUP ends the program. Where the file system has no locks, none is taken.
+// Only one object may exist at a time.
 class OutputLock {
  public:
   // Throws CommandError if the file is in use.
@@ -40,8 +40,8 @@ class OutputDirectory {
   // The arguments of output_path(). Throws CommandError.
   OutputDirectory(const std::string& given, const std::string& recording);
 
-  // Writes a file and remembers it under `kind`. write(path, &error) returns success. Throws
-  // CommandError.
+  // Writes a file of this name in the directory and remembers it under `kind`. write(path, &error)
+  // returns whether it succeeded. Throws CommandError.
   using Write = std::function<bool(const std::string&, std::string*)>;
   void add(const char* kind, const char* name, const Write& write);
   void add(const char* kind, const char* name, const std::string& text);

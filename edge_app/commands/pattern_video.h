@@ -8,8 +8,10 @@
 
 namespace alidade {
 
-// progress: called with the number of images so far; if it returns false, the search ends with
-// CommandError. Also throws CommandError if there is no readable video or the image size changes.
+// video: a recording's directory or a video file. progress: called after each image with the number
+// of images so far and the number of these in which the pattern was found; if it returns false, the
+// search ends with CommandError. Also throws CommandError if there is no readable video or the
+// image size changes.
 [[nodiscard]] PatternVideo find_pattern(const std::string& video, const KnownPattern& pattern,
                                         const std::function<bool(int images, int found)>& progress);
 

@@ -7,7 +7,7 @@
 namespace alidade {
 
 struct PlaneOptions {
-  std::string action;  // fit
+  std::string action;  // "fit"
   std::string data;    // file with what is known of the ground, see plane_data.h
   std::string output;  // empty: plane.yaml beside the data
   bool json = false;
@@ -17,8 +17,8 @@ struct PlaneOptions {
 [[nodiscard]] int fit_plane_command(const PlaneOptions& options);
 
 // The same for a client of `run`, POST /api/v1/plane/fit. body: the data as JSON. *answer: the fit
-// as JSON with the text of plane.yaml, which is null if there is no plane; a message says why.
-// False with one line in *error if the data cannot be read.
+// as JSON with the text of plane.yaml; if there is no plane, the text is null and a message says
+// why. False with one line in *error if the data cannot be read.
 [[nodiscard]] bool answer_plane_fit(const std::string& body, std::string* answer,
                                     std::string* error);
 

@@ -7,12 +7,13 @@
 namespace alidade {
 
 struct RecordOptions {
-  std::string config;
-  std::string directory;
-  double duration_s = std::numeric_limits<double>::infinity();
+  std::string config;     // path of alidade.yaml
+  std::string directory;  // of the recording; is made if it does not exist
+  double duration_s = std::numeric_limits<double>::infinity();  // infinite: until a signal
 };
 
-// Stores the live streams as a recording. Returns the exit code; throws CommandError.
+// Stores the live streams as a recording. Returns the exit code. Throws CommandError, also if the
+// directory already holds a recording.
 [[nodiscard]] int record_streams(const RecordOptions& options);
 
 }  // namespace alidade

@@ -1,6 +1,6 @@
 #pragma once
-// What a step over a recording needs, for `replay` and `verify`: its calibration, its frames and
-// samples one after the other, its pictures.
+// Input of a step over a recording, for `replay` and `verify`: calibration, frames and samples one
+// after the other, images.
 
 #include <limits>
 #include <memory>
@@ -37,14 +37,14 @@ std::optional<Item> next_of(Source& source) {
 
 [[nodiscard]] bool has_images(const std::string& recording);
 
-// The images of a recording. Another source counts its frames; some frames may have no image.
+// The images of a recording. Its frames come from another source; some of them may have no image.
 class RecordedImages {
  public:
-  // Throws CommandError if none can be decoded.
+  // Throws CommandError if no image can be decoded.
   explicit RecordedImages(const std::string& recording);
 
-  // The image of the frame with this stamp; empty if it is missing. Call it once for each frame, in
-  // order.
+  // The image of the frame with this stamp; empty if there is none. To be called once for each
+  // frame, in order.
   std::optional<Frame> of(const FrameStamp& stamp);
 
   [[nodiscard]] std::vector<std::string> remarks() const { return source_->remarks(); }
@@ -54,7 +54,7 @@ class RecordedImages {
   std::optional<Frame> next_;
 };
 
-// Not valid() if there is no image.
+// Lent with `image`. Not valid() if there is no image.
 [[nodiscard]] ImageView view_of(const std::optional<Frame>& image);
 
 }  // namespace alidade

@@ -1,10 +1,11 @@
 #pragma once
 // ReplayTargets: makes targets.jsonl from a replay's records and from detections in a file or on
 // stdin. Detections are JSON Lines, each like the body of POST /api/v1/detections.
-// After each record, lines are read until one is for that record's frame or for a later frame; the
-// latter waits for its record. So a detector that reads the records may answer them, lines may be
-// late, and the same lines give the same bytes. A line that cannot be read is an error with its
-// number. Frames and boxes that a live run would refuse are counted and reported at the end.
+// After each record, lines are read up to the one for the record's frame. A line for a later frame
+// ends the reading, too, and waits for its record. So a detector that reads the records may answer
+// them, lines may be late, and the same lines give the same bytes. A line that cannot be read is an
+// error with its number. Frames and boxes that a live run would refuse are counted and reported at
+// the end.
 
 #include <cstddef>
 #include <cstdint>
@@ -25,8 +26,8 @@ namespace alidade {
 class ReplayTargets {
  public:
   // detections: a file, or "-" for stdin. tracking: a configuration with section `tracking`; empty:
-  // the sphere and its defaults. path: the result; it appears in complete(). All functions here
-  // throw CommandError.
+  // on the sphere, with defaults. path: of the result, which gets its name in complete(). signals:
+  // borrowed. All public functions throw CommandError.
   ReplayTargets(const std::string& detections, const std::string& tracking, std::string path,
                 StopSignals* signals);
 

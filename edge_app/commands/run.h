@@ -7,8 +7,8 @@
 namespace alidade {
 
 struct RunOptions {
-  std::string config;
-  double duration_s = std::numeric_limits<double>::infinity();
+  std::string config;                                           // path of alidade.yaml
+  double duration_s = std::numeric_limits<double>::infinity();  // infinite: until a signal
   bool json = false;
   bool csv = false;
 };

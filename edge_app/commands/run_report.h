@@ -1,6 +1,6 @@
 #pragma once
-// What `alidade run` reports beside its records: the last lines of its log (`replay` has one of
-// them, too), and its state to a service manager.
+// What `alidade run` reports beside its records: the last lines of its log, and its state to a
+// service manager. `replay` has the first of these lines, too.
 
 #include <string>
 
@@ -18,15 +18,16 @@ namespace alidade {
                                    const ZoomCurve& curve);
 
 // Reports to a service manager once a period: the state and, as long as records get through the
-// threads, that the process is alive. A missing camera does not get the process killed; a thread
-// that hangs does.
+// threads, that the process is alive. The service manager kills a process of which a thread hangs,
+// but not one whose camera is missing.
 class LifeReport {
  public:
   // Both must outlive this object.
   LifeReport(const ServiceManager& manager, Pipeline* pipeline);
 
-  // s; infinite without a service manager.
+  // Infinite without a service manager.
   [[nodiscard]] double period_s() const;
+  // Reports. To be called once a period.
   void tell();
 
  private:

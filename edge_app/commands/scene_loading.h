@@ -11,14 +11,15 @@
 
 namespace alidade {
 
+// Whether the configuration names a source of telemetry.
 [[nodiscard]] bool has_telemetry(const Config& config);
 
 // False with one line in *error: the map cannot be read, or its pictures are not width x height px.
 [[nodiscard]] bool open_scene(const SceneMapConfig& config, int width, int height,
                               SceneMapFile* file, SceneMap* map, std::string* error);
 
-// Null if no map is configured, the mode is PT, or the map cannot be used. Records then go on in
-// telemetry's base. Without telemetry a map that cannot be used throws CommandError.
+// Null if no map is configured, the mode is PT, or the map cannot be used. Records are then in
+// telemetry's base. If there is no telemetry, a map that cannot be used throws CommandError.
 [[nodiscard]] std::unique_ptr<SceneLocalization> load_scene(
     const Config& config, const PublishedCalibration& calibration);
 

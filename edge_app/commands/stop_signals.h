@@ -1,7 +1,7 @@
 #pragma once
 // StopSignals: SIGINT and SIGTERM as an event to wait for, so that a live command ends cleanly.
-// Construct it before starting any thread: threads inherit the blocked signals, and only wait()
-// sees them. After the first signal a second one ends the process at once, as usual.
+// It must be constructed before any thread starts: threads inherit the blocked signals, and only
+// wait() sees the signals. After the first signal a second one ends the process at once, as usual.
 
 #include <signal.h>
 

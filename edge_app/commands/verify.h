@@ -16,8 +16,8 @@ struct VerifyOptions {
 };
 
 // How good a calibration is on a recording. Returns the exit code: kExitOk if the sigmas hold,
-// kExitFailed if they are contradicted, kExitUsage if that cannot be judged. Throws CommandError,
-// with kExitUsage: nothing was judged.
+// kExitFailed if they are contradicted, kExitUsage if the recording does not suffice to judge.
+// Throws CommandError, with kExitUsage: nothing was judged.
 [[nodiscard]] int verify_calibration(const VerifyOptions& options);
 
 }  // namespace alidade

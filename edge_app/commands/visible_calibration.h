@@ -12,9 +12,9 @@
 
 namespace alidade {
 
-// Calibrates. If the job has no tracks, they are found in the video first; with passes 2 they are
-// then found again with the first estimate. Leaves observations, remarks and the options used in
-// *job.
+// Calibrates. If the job has no tracks, they are found in the video first; with passes = 2 they are
+// then found again with the first estimate. *job gets the observations, the remarks and the options
+// that were used.
 [[nodiscard]] CalibrationResult calibrate_job(int passes, CalibrationJob* job,
                                               StopSignals* signals);
 

@@ -35,8 +35,8 @@ struct CameraConfig {
   std::optional<FocalLengthRange> focal_length_range;
   double aspect = 1;
   double radial_distortion = 0;
-  // Of the optical centre about the picture's middle, in each calibration. 0: it is the middle.
-  // Empty: 1 % of the width.
+  // Sigma of the optical centre about the picture's middle, in each calibration. 0: the centre is
+  // the middle. Empty: 1 % of the width.
   std::optional<double> centre_sigma_px;
   double line_delay_s = 0;  // s/row, of the sensor read from top to bottom
   // The camera hangs upside down and turns its image by 180 degrees; negates line_delay_s.
@@ -51,9 +51,9 @@ struct CalibrationConfig {
   // Device units; two zoom readings that differ by no more are one zoom. Empty: found from their
   // jitter (steady_zoom.h).
   std::optional<double> zoom_tolerance;
-  // s, one standard deviation of the links' delay against that of the connection for which the
-  // calibration was stored, until movement has shown the delay. Empty: LinkDelay::kOpenSigma_s. If
-  // it is set and the mode is PT, no picture is decoded.
+  // One standard deviation of the difference between the links' delay and the delay of the
+  // connection for which the calibration was stored, until movement has shown the delay. Empty:
+  // LinkDelay::kOpenSigma_s. If a value is set and the mode is PT, no picture is decoded.
   std::optional<double> clock_offset_sigma_s;
 };
 

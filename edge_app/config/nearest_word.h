@@ -1,6 +1,6 @@
 #pragma once
-// Finds the word that was probably meant by a mistyped one, for "did you mean" in the configuration
-// and on the command line. Pure; allocates.
+// Finds the word that a mistyped one was probably meant to be, for "did you mean" in the
+// configuration and on the command line. Pure; allocates.
 
 #include <optional>
 #include <string>

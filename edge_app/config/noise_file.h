@@ -1,7 +1,7 @@
 #pragma once
 // noise.yaml of a recording: the noise of its streams. Every key is optional, and so is the file. A
 // stamp sigma says that the time stamps scatter to both sides of the true time (symmetric jitter).
-// Without it they are assumed to be late only, as those of a live stream are.
+// Without a stamp sigma the time stamps are assumed to be late only, as in a live stream.
 
 #include <optional>
 #include <string>

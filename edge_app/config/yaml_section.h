@@ -57,7 +57,8 @@ class YamlSection {
   // "FILE:LINE: SECTION.KEY". If the key is absent, the line is the section's.
   [[nodiscard]] std::string where(const std::string& key) const;
   [[noreturn]] void fail(const std::string& key, const std::string& what) const;
-  // For a required key: "is missing; EXPECTED". If it was mistyped, the message names that key.
+  // For a required key: "is missing; EXPECTED". If a key of the file looks like a mistyped one, the
+  // message names it.
   [[noreturn]] void fail_missing(const std::string& key, const std::string& expected) const;
 
  private:

@@ -2,10 +2,10 @@
 // BaseJudge: how far a record is off the localized picture, and whether telemetry's zero or the
 // base has moved.
 //   change = localized angle - record's angle, at the row for which the map's pose holds
-// A record in telemetry's base is expected within zero_sigma of the map's base; one in the map's
-// base within its own sigma. A larger change is a movement once a second picture confirms it. A
-// movement is either corrected, and earlier results no longer count, or only reported. Pure: no
-// thread, no clock. Allocates nothing.
+// A record in telemetry's base is expected within zero_sigma of the map's base; a record in the
+// map's base is expected within its own sigma. A larger change is a movement once a second picture
+// confirms it. A movement is corrected, and earlier results no longer count; or it is only
+// reported. Pure: no thread, no clock. Allocates nothing.
 
 #include <optional>
 
@@ -24,10 +24,10 @@ struct BaseJudgeOptions {
 class BaseJudge {
  public:
   enum class Verdict {
-    kExpected,   // within the expected: use it
-    kSuspected,  // beyond it: a second picture has to confirm it
-    kMoved,      // confirmed: use it
-    kReported    // confirmed: only report it
+    kExpected,   // as expected: the result is to be used
+    kSuspected,  // a larger change: a second picture has to confirm it
+    kMoved,      // confirmed: the result is to be used
+    kReported    // confirmed: the movement is only to be reported
   };
 
   explicit BaseJudge(const BaseJudgeOptions& options = {}) : options_(options) {}

@@ -1,7 +1,6 @@
 #pragma once
 // SceneSearch: finds where one picture looks in a scene map: with few features first, and with more
-// if those do not suffice (core/mapping/localization.h). Batch work: allocates. One thread at a
-// time.
+// if few do not suffice (core/mapping/localization.h). Batch work: allocates. One thread at a time.
 
 #include <optional>
 #include <string>
@@ -20,8 +19,8 @@ class SceneSearch {
   // Builds the index of the map, which need not outlive this object.
   explicit SceneSearch(const SceneMap& map);
 
-  // image: of the map's size. *seen: the features of the last search, with which the picture was
-  // found or not.
+  // image: of the map's size. *seen: the features of the last search, whether it found the picture
+  // or not.
   [[nodiscard]] Localization find(const ImageView& image, const LocalizationHint& hint,
                                   FeatureSet* seen) const;
 
@@ -31,7 +30,7 @@ class SceneSearch {
   FeatureDetector thorough_;
 };
 
-// The prior for a picture that is taken to be at this calibration's zoom.
+// The prior for a picture that is assumed to be at this calibration's zoom.
 [[nodiscard]] FocalLengthPrior focal_length_of(const Calibration& calibration);
 
 // The focal lengths of a zoom curve, px.

@@ -1,9 +1,10 @@
 #pragma once
-// SceneUpkeep: keeps the scene map in use true by the pictures found in it
+// SceneUpkeep: keeps the scene map in use up to date by the pictures found in it
 // (core/mapping/scene_map_upkeep.h), in memory and on disk. Each picture is one transaction, on
 // disk when show() returns: if the process ends, at most the present picture is lost. If the disk
-// refuses, that is logged once and the upkeep ends; the map stays as it is on disk. The localizer's
-// index is of an earlier state of the map: is_due() says when a new one is worthwhile. One thread.
+// refuses a transaction, the refusal is logged once and the upkeep ends; the map stays as it is on
+// disk. The localizer's index is of an earlier state of the map: is_due() says when a new index is
+// worthwhile. One thread.
 
 #include <cstdint>
 #include <functional>

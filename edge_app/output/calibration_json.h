@@ -15,11 +15,12 @@ nlohmann::ordered_json parameters_json(const Calibration& calibration);
 // All of calibration.yaml except the notes on the run that wrote it.
 nlohmann::ordered_json calibration_json(const Calibration& calibration);
 
-// The keys of what telemetry is off by, as far as it is; a curve has samples over its knots, too.
+// The telemetry's errors that were found, with the keys of calibration.yaml; a curve has samples
+// beside its knots.
 nlohmann::ordered_json telemetry_error_json(const TelemetryError& error);
 
-// A zoom curve, not empty: its nodes at dwells, and samples of the focal length from the first to
-// the last reading.
+// curve: not empty. Its nodes at dwells, and samples of the focal length (px) from the first to the
+// last zoom reading.
 nlohmann::ordered_json zoom_curve_json(const ZoomCurve& curve);
 
 }  // namespace alidade

@@ -23,15 +23,16 @@ struct SummaryRow {
 std::vector<SummaryRow> summary_rows(const CalibrationResult& result,
                                      const CalibrationOptions& options);
 
-// What f's sigma takes for granted of the head, as no recording shows an error that turns as slowly
-// as the range that was visited; empty with a claim of the maker, or without such a sigma.
+// The assumption about the head on which the sigma of f rests: a recording does not show an error
+// that changes as slowly as the range of angles that was visited. Empty: the maker's claim is
+// stated, or f has no such sigma.
 std::string taken_for_granted(const CalibrationResult& result, const CalibrationOptions& options);
 
 // The table in aligned columns, the verdict, what was left out, and advice. Each line ends with a
 // line feed.
 std::string summary_text(const CalibrationResult& result, const CalibrationOptions& options);
 
-// What the telemetry's angles are off by, a line for each axis; none if nothing is.
+// The errors found in the telemetry's angles, a line for each axis that has one.
 std::vector<std::string> telemetry_error_lines(const TelemetryError& error);
 
 // One line. files: kind and path of each file that was written.

@@ -6,7 +6,8 @@
 //    "boxes": [{"u": 10, "v": 20, "width": 30, "height": 70, "score": 0.9, "class": "person"},
 //              ...]}
 //
-// Boxes as in detection_box.h. score (default 1) and class (default none) may be left out. An empty
+// Boxes are those of detection_box.h, px. score (default 1) and class (default none) may be left
+// out. An empty
 // list of boxes is valid. JSON writes a number that is not finite as null; null is read as NaN.
 // check_detections() judges whether the numbers are possible for the frame.
 

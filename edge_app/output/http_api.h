@@ -28,12 +28,12 @@ struct HttpApiSources {
   std::function<bool()> ask_for_calibration;
   // The zoom curve in use; returns null if there is none. May be an empty function.
   std::function<std::shared_ptr<const ZoomCurve>()> zoom_curve;
-  // What the telemetry is off by, as it is corrected; may be null or an empty function.
+  // The errors by which the telemetry is corrected; may return null, and may be an empty function.
   std::function<std::shared_ptr<const TelemetryError>()> telemetry_error;
   std::shared_ptr<const PlaneEstimate> plane;  // null: none is configured
   // Fits the ground plane. body and *answer are JSON; false with one line in *error.
   std::function<bool(const std::string& body, std::string* answer, std::string* error)> fit_plane;
-  // Both null if nothing is tracked. They must live as long as `live`. They wake the server, too.
+  // Both null if nothing is tracked. They must live as long as `live`, and wake the server, too.
   TargetFeed* targets = nullptr;
   TargetLines* target_lines = nullptr;
   std::function<DetectorsReport()> detectors;  // empty: no built-in detector
@@ -44,7 +44,7 @@ struct HttpApiSources {
   bool latency_measured = true;  // false for a recording
 };
 
-// Null if there is none.
+// The zoom curve in use. Null: there is none.
 [[nodiscard]] std::shared_ptr<const ZoomCurve> zoom_curve_of(const HttpApiSources& sources);
 
 // *sources.live and the functions are used until the server has stopped. Every record wakes the

@@ -1,7 +1,7 @@
 #pragma once
 // What requests in JSON share: strict reading and the choice of a frame. An unknown key, a wrong
-// type or a number that is not finite is an error that says so. The parsers are pure. They take
-// memory in proportion to the text, whose length the caller limits.
+// type or a number that is not finite is an error that says which. The parsers are pure. They take
+// memory in proportion to the text; the caller limits the text's length.
 
 #include <cstdint>
 #include <nlohmann/json_fwd.hpp>

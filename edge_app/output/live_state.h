@@ -26,8 +26,8 @@ namespace alidade {
 
 struct LiveStateOptions {
   double kept_s = 10;           // s of time_s; how long records with a frame are kept
-  std::size_t max_kept = 2048;  // at most this many of them
-  std::size_t max_lines = 512;  // that a reader may be behind
+  std::size_t max_kept = 2048;  // most records with a frame that are kept
+  std::size_t max_lines = 512;  // most lines by which a reader may be behind
   double history_s = 60;
   double history_step_s = 0.1;
 };
@@ -43,7 +43,7 @@ struct HistorySample {
   std::optional<double> latency_s;  // longest of the step
 };
 
-// What a reader has got so far. `lost` includes losses that it does not know of yet.
+// What a reader has got so far. `lost` includes losses of which the reader does not know yet.
 struct ReaderCounters {
   std::int64_t records = 0;
   std::int64_t lost = 0;
@@ -63,8 +63,8 @@ class LiveState final : public RecordSink {
   // The newest record with an orientation.
   [[nodiscard]] std::optional<OrientationRecord> newest_oriented() const;
   [[nodiscard]] FrameSearch find(std::int64_t frame, OrientationRecord* record) const;
-  // The frame whose row 0 was exposed nearest to time_s. The distance may be at most half the time
-  // to the nearer neighbour of that frame, or 1 ms if that is more.
+  // The frame whose row 0 was exposed nearest to time_s (s, host clock). The distance is at most
+  // half the time to the frame's nearer neighbour, or 1 ms if half that time is less.
   [[nodiscard]] FrameSearch find_at(double time_s, OrientationRecord* record) const;
   [[nodiscard]] std::vector<HistorySample> history() const;
   // Host time at which the calibration in use was first seen; empty before the first record.

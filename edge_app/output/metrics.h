@@ -30,8 +30,8 @@ class MetricsText {
 
   void add(double value, const Labels& labels = {});
   void add(std::int64_t value, const Labels& labels = {});
-  // For a histogram family. Every 16th bucket is written; each is 2.2 times as long as the one
-  // before.
+  // For a histogram family. Every 16th bucket is written; a written bucket is 2.2 times as long as
+  // the written one before.
   void add(const LatencyHistogram& histogram, const Labels& labels = {});
 
   [[nodiscard]] const std::string& text() const { return text_; }

@@ -1,10 +1,10 @@
 #pragma once
 // MqttConnection: one connection to a broker, from the attempt to its end, by libmosquitto (MQTT
 // 3.1.1). Each attempt is a new object. So nothing of an old connection is sent over a new one, and
-// what a broker retains is never overwritten by something older. For one thread, which waits until
-// socket() is ready and then calls step(). If a name has several addresses, the first that does not
-// refuse at once is taken. The library looks up names in a call that blocks, so the owner's Errand
-// makes it.
+// no message that a broker retains is overwritten by an older one. For one thread, which waits
+// until socket() is ready and then calls step(). If a name has several addresses, the first that
+// does not refuse at once is taken. The library looks up names in a call that blocks, so the
+// owner's Errand makes that call.
 
 #include <functional>
 #include <memory>
@@ -42,13 +42,14 @@ class MqttConnection {
   // Reads and writes what is possible without waiting. False: the connection failed or ended.
   [[nodiscard]] bool step();
   [[nodiscard]] bool is_connected() const { return connected_; }
-  // One line that says what failed, names the broker and says what would be right. Has no password.
+  // One line that names the broker, what failed and what would be right. Has no password.
   [[nodiscard]] const std::string& error() const { return error_; }
 
-  // Or what becomes readable once the name is looked up; negative: none.
+  // The descriptor to wait for: the socket, or, while the broker's name is looked up, a descriptor
+  // that becomes readable at the end. Negative: none.
   [[nodiscard]] int socket() const;
-  // What to wait for at socket(), and how long at most. During the TLS handshake the library does
-  // not say what it waits for.
+  // What to wait for at socket(), and patience_s(): how long at most, s. During the TLS handshake
+  // the library does not say what it waits for.
   [[nodiscard]] bool wants_to_read() const { return half_since_s_ < 0; }
   [[nodiscard]] bool wants_to_write() const;
   [[nodiscard]] double patience_s() const;

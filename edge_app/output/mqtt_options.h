@@ -18,7 +18,7 @@ struct MqttOptions {
   std::string client_id;  // empty: random
   std::string prefix = "alidade";
   int qos = 1;
-  int keep_alive_s = 15;      // after 1.5 times that without a sign the broker publishes `offline`
+  int keep_alive_s = 15;      // s; after 1.5 times this without a sign the broker says `offline`
   double timeout_s = 5;       // s, from an attempt to the broker's answer
   double max_backoff_s = 30;  // s, longest pause between two attempts
   double orientation_rate_hz = 1;  // at most; 0: orientation is not published

@@ -4,11 +4,11 @@
 //   PREFIX/targets       targets after a frame of detections, like the event `targets`; retained
 //   PREFIX/clock         host clock and wall clock (clock_pair.h), every ten seconds; retained
 //   PREFIX/orientation   the newest record, at most orientation_rate_hz times a second
-// For each topic one message is under way and at most one waits; a newer one replaces it. So a
-// slow, silent or missing broker costs no memory and delays nobody, and gets the newest state when
-// it is back. The pauses between attempts to connect grow. The first connection deletes targets
-// that the broker retains from an earlier run, as their times and identities have lost their
-// meaning.
+// For each topic at most one message is under way and one waits; a newer message replaces the one
+// that waits. So a slow, silent or missing broker costs no memory, delays nobody, and gets the
+// newest state when it is back. The pauses between attempts to connect grow. The first connection
+// deletes targets that the broker retains from an earlier run, as their times and identities have
+// lost their meaning.
 
 #include <array>
 #include <atomic>
@@ -41,10 +41,10 @@ class MqttPublisher final : public RecordSink {
   ~MqttPublisher() override;
 
   [[nodiscard]] bool start();  // false: the thread cannot be started
-  // Publishes offline, if the broker accepts it within half a second.
+  // Publishes `offline`, if the broker accepts this within half a second, and ends the thread.
   void stop();
 
-  // Any thread; does not wait.
+  // json: as the event `targets`. Any thread; does not wait.
   void take_targets(std::shared_ptr<const std::string> json);
   // For the output thread.
   [[nodiscard]] bool write(const OrientationRecord& record) override;

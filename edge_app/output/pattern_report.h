@@ -15,8 +15,8 @@ struct PatternReportInput {
   std::string pattern;  // as the user named it
   const PatternData& data;
   const PatternCalibration& calibration;  // must be kOk
-  int images = 0;                         // read
-  int found = 0;                          // with the pattern
+  int images = 0;                         // number of images read
+  int found = 0;                          // number of images with the pattern
   std::vector<std::string> remarks;
   std::string version;  // of the program
   std::string date;     // date, time and zone of the report

@@ -6,9 +6,9 @@
 //   {"frame": N | "time_s": t, "directions": [[x, y, z], ...]}
 //
 // Frames, units, directions, pixels and covariances are those of frame_orientation.h. A covariance
-// holds motion, calibration and the correlation of the two, each once; s^2 J_u J_u^T is added for
-// the noise of the pixel. The parsers are pure and strict (json_query.h); too many items are an
-// error, too.
+// holds the errors of motion and of calibration, and their correlation, each once. For the noise of
+// the pixel s^2 J_u J_u^T is added. The parsers are pure and strict (json_query.h); more than
+// kMaxQueryItems are an error, too.
 
 #include <cstdint>
 #include <optional>
@@ -42,8 +42,8 @@ struct PixelQuery {
 [[nodiscard]] bool parse_pixel_query(const std::string& body, PixelQuery* query,
                                      std::string* error);
 
-// The record must have a frame and an orientation. One line of JSON with a line feed. With a plane,
-// each direction also has its place on the plane.
+// The answer as one line of JSON with a line feed. The record must have a frame and an orientation.
+// With a plane, each direction also has its place on the plane.
 [[nodiscard]] std::string direction_answer(const OrientationRecord& record,
                                            const DirectionQuery& query,
                                            const PlaneEstimate* plane = nullptr);

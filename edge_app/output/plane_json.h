@@ -17,8 +17,8 @@ namespace alidade {
                                                     const PlaneFit& fit);
 
 // Where a direction meets the ground: position_m, covariance_m2, distance_m from the camera, and,
-// if the plane has an origin, latitude_deg and longitude_deg; otherwise error. d_b: base frame;
-// cov_d: rad^2, in tangent_basis(d_b).
+// if the plane has an origin, latitude_deg and longitude_deg. If the direction does not meet the
+// ground, only `error`. d_b: unit vector, base frame; cov_d: rad^2, in tangent_basis(d_b).
 [[nodiscard]] nlohmann::ordered_json plane_point_json(const PlaneEstimate& estimate,
                                                       const Vector3<double>& d_b,
                                                       const Matrix2<double>& cov_d);

@@ -1,6 +1,5 @@
 #pragma once
-// RecordSinks: gives each record to several sinks, one after the other. If one of them ends, all
-// end.
+// RecordSinks: gives each record to several sinks, one after the other. If one sink ends, all end.
 
 #include <vector>
 

@@ -22,6 +22,7 @@ inline constexpr int kHalf_px = 510;   // one of two side by side
 inline constexpr double kDegrees = 180 / kPi;
 inline constexpr double kMilli = 1e3;  // s -> ms, rad -> mrad
 
+// A time without used frames, relative to ReportPage::start_s().
 struct TimeGap {
   double begin_s = 0;
   double end_s = 0;
@@ -78,7 +79,7 @@ class ReportPage {
   std::string body_;
 };
 
-// Which frames were not used, with a line for each reason. In report_frames.cpp.
+// How many frames were not used, a line for each reason. In report_frames.cpp.
 std::vector<std::string> unused_frames(const ReportPage& page);
 // In report_residuals.cpp.
 void residuals(ReportPage& page);
@@ -89,7 +90,8 @@ void landmarks(ReportPage& page);
 // In report_telemetry.cpp. Nothing if telemetry was found exact but for noise.
 void telemetry_error(ReportPage& page);
 
-// A symmetric range that shows `quantile` of the magnitudes, with a margin.
+// Half the width of a symmetric range that shows the share `quantile` (0 to 1) of the magnitudes,
+// with a margin.
 inline double symmetric_range(std::vector<double> magnitudes, double quantile) {
   if (magnitudes.empty()) return 1;
   const auto at = magnitudes.begin() + static_cast<std::ptrdiff_t>(

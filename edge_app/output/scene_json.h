@@ -7,7 +7,7 @@
 
 namespace alidade {
 
-// now_s: host time; ages are relative to it.
+// now_s: s, host clock; ages are relative to now_s.
 [[nodiscard]] nlohmann::ordered_json scene_json(const SceneReport& report, double now_s);
 
 }  // namespace alidade

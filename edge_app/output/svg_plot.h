@@ -32,13 +32,13 @@ class SvgPlot {
 
   void dots(const std::vector<PlotPoint>& points, const char* colour, double diameter = 2.2);
   void line(const std::vector<PlotPoint>& points, const char* colour);
-  // Between two lines; the line is drawn over it separately.
+  // Fills the area between the lines `low` and `high`, without drawing these lines.
   void area(const std::vector<PlotPoint>& low, const std::vector<PlotPoint>& high,
             const char* colour);
   void arrow(const PlotPoint& from, const PlotPoint& to);
   // A grey band from `low` to `high` over the whole width.
   void band(double low, double high);
-  // Shades `from` to `to`, which have no data, over the whole height.
+  // Shades the range of x from `from` to `to`, which has no data, over the whole height.
   void shade(double from, double to);
   void level(double y);
   void rectangle(const PlotPoint& from, const PlotPoint& to, const char* colour, double opacity);

@@ -27,7 +27,8 @@ class TargetLines {
   void take(const TargetsState& state);
   [[nodiscard]] Newest newest() const;
 
-  // Must be called before the first line. take() calls on_news for each new line; it must not wait.
+  // Must be called before the first line. take() calls on_news for each new line; on_news must not
+  // wait.
   void set_on_news(std::function<void()> on_news) { on_news_ = std::move(on_news); }
 
  private:

@@ -57,7 +57,8 @@ struct PipelineSummary {
   double delay_wander_s = 0;  // s, of the video, as of the last frame; 0: it does not wander
   // The rate of the sender's time stamps, less one, if they are left out because of it.
   std::optional<double> stamps_left_out;
-  // As of the last frame, and the host's time since which it is so; empty: no calibration.
+  // As of the last frame (empty: no calibration), and the host's time since which it has this
+  // state.
   std::optional<LinkDelayReport> link_delay;
   double link_delay_since_s = 0;
   std::int64_t records = 0;
@@ -94,8 +95,8 @@ class Pipeline {
   [[nodiscard]] int finished_fd() const { return finished_; }
 
   // Checks whether records could get through. A pulse goes the way of a record, through the
-  // real-time and the output thread. Neither waits for a camera or a head, so only a thread that
-  // hangs, or a sink that takes nothing, leaves it unanswered.
+  // real-time and the output thread. Neither waits for a camera or a head, so a pulse stays
+  // unanswered only if a thread hangs or the sink takes nothing.
   void ask_for_pulse() { stage_.ask_for_pulse(); }
   [[nodiscard]] bool pulse_is_answered() const { return stage_.pulse_is_answered(); }
 

@@ -82,9 +82,9 @@ bool refuse(Source& source, const std::string& fault) {
 
 // Item: Frame or PanTiltSample. on_item(item): returns false to end. on_loss(now_s): called at a
 // loss and then each second until the next item. fault_of(item): why an item cannot be used; empty
-// if it can. A faulty first item ends the loop with that error. After a good item a fault is the
-// peer's doing, and the source gives up the connection. *watch is informed of all this. Returns the
-// source's error if it failed for good.
+// if it can. A faulty first item ends the loop with its fault as error. After a good item a fault
+// is the peer's doing, and the source gives up the connection. *watch is informed of all this.
+// Returns the error if the source failed for good, else an empty text.
 template <typename Item, typename Source, typename OnItem, typename OnLoss,
           typename FaultOf = TakesAll>
 std::string read_to_the_end(Source& source, LinkWatch* watch, const OnItem& on_item,

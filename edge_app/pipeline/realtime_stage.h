@@ -127,14 +127,14 @@ class RealtimeStage {
   void give_back(ImageSlot slot) { returned_by_calibration_.push(slot); }
   // Requests the next frame's image.
   void want_image() { image_wanted_.store(true, std::memory_order_relaxed); }
-  // The real-time thread adopts it between two frames. It must live until pop_adopted() returns it.
-  // False: too many wait already.
+  // The real-time thread adopts the calibration between two frames. The calibration must live until
+  // pop_adopted() returns it. False: too many wait already.
   bool publish(const PublishedCalibration* calibration);
   bool pop_adopted(const PublishedCalibration*& calibration) { return adopted_.pop(calibration); }
   void report(CalibrationReport report) { report_.store(report, std::memory_order_relaxed); }
 
-  // Any thread: asks for a sign of life. It goes the way of a record: the real-time thread passes
-  // it on between two frames, and the output thread answers it between two records.
+  // Any thread: asks for a sign of life. The request goes the way of a record: the real-time thread
+  // passes it on between two frames, and the output thread answers it between two records.
   void ask_for_pulse();
   // Output thread.
   void answer_pulse();

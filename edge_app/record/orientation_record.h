@@ -4,9 +4,9 @@
 // time_s, when row 0 was exposed. At row v each angle is
 //   angle + rate t + acceleration t^2 / 2,  t = v * line delay.
 // q is R_base_from_camera. Covariance and sigma are of a perturbation R * Exp(xi), camera frame.
-// A record of a lost video has neither frame nor time_s; a frame that may have waited has no
-// time_s. In mode `none` there is no orientation. If OE mode is asked for, `ok` means mode OE.
-// Fixed size and trivially copyable: crosses the queue to the output thread by value.
+// A record of a lost video has neither frame nor time_s; the record of a frame that may have waited
+// has no time_s. In mode `none` there is no orientation. If OE mode is asked for, the status `ok`
+// means mode OE. Fixed size and trivially copyable, for the queue to the output thread.
 
 #include <array>
 #include <cstdint>
@@ -70,7 +70,7 @@ static_assert(std::is_trivially_copyable_v<OrientationRecord>);
 // Of row 0: angles wrapped to [-pi, pi), w of the quaternion >= 0.
 [[nodiscard]] OrientationRecord::Orientation orientation_of(const FrameOrientation& frame);
 
-// Called by the output thread alone, except for interrupt().
+// Where the records go. Called by the output thread alone, except for interrupt().
 class RecordSink {
  public:
   virtual ~RecordSink() = default;

@@ -20,7 +20,7 @@ struct PublishedCalibration {
   std::string name;                // for people: a file, "data sheet", "live"
   ZoomCurve zoom_curve;            // for other zooms, and while the zoom moves; may be empty
   TelemetryError telemetry_error;  // of the head, at any zoom; may be empty
-  // Its clock offset was found through the present connection. False: perhaps through another one,
+  // The clock offset was found through the present connection. False: perhaps through another one,
   // whose least delay may differ.
   bool of_this_connection = true;
 };

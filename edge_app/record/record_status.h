@@ -9,8 +9,8 @@
 //   OrientationStep           no calibration, zoom, video lost, repeated images (RepeatedImages),
 //                             not localized (SceneStart)
 //   RealtimeStage             images too late to be looked at
-// If OE mode is asked for, kOk occurs in mode OE only. What each means to a user and what to do:
-// docs/records.md.
+// If OE mode is asked for, kOk occurs in mode OE only. What each status means to a user, and what
+// to do: docs/records.md.
 
 #include <array>
 #include <cstddef>
@@ -31,15 +31,15 @@ enum class RecordStatus : std::uint8_t {
   // No connection to the pan/tilt source; its last angle is too old, or there were fewer than two.
   kTelemetryLost,
   kTelemetryMissing,  // fewer than two usable samples so far
-  // The frame lies more than TelemetryLimits::max_extrapolation_s beyond the newest trusted angle.
-  // By how much: OrientationRecord::telemetry_age_s. The causes, and which key to change:
+  // The frame lies more than TelemetryLimits::max_extrapolation_s beyond the newest trusted angle;
+  // OrientationRecord::telemetry_age_s says how far. The causes, and which key to change:
   // docs/records.md.
   kTelemetryTooOld,
   kTelemetryGap,          // the samples around the frame lie too far apart
   kFrameBeforeTelemetry,  // older than the oldest sample kept by more than max_extrapolation_s
   kTooFewLandmarks,       // mode PT: too few landmarks held
   kContradiction,         // mode PT: landmarks and telemetry exclude each other
-  kSceneMoves,            // mode PT: what is in view moves, or it is not known what of it
+  kSceneMoves,            // mode PT: what is in view moves, or it is not known which part moves
   kBadImage,              // mode PT: no image, or not of the calibration's size
   kImageTooLate,          // mode PT: other frames waited behind this one, so it lost its image
   kImageRepeated,  // the image before was sent again while the camera turned (RepeatedImages)

@@ -1,8 +1,9 @@
 #pragma once
 // Why a session gave no calibration, and what would help. If pictures were sent again while the
-// camera turned, nobody knows when the others were taken; if most pictures were never looked at, as
-// on an overloaded machine, too few were seen. The reason says so, and a mismatch between telemetry
-// and motion, which follows from it, is not reported. Pure; allocates.
+// camera turned, nobody knows when the other pictures were taken. If most pictures were never
+// looked at, as on an overloaded machine, too few were seen. In both cases the reason says so, and
+// the mismatch between telemetry and motion, which is only a consequence, is not reported. Pure;
+// allocates.
 
 #include <cstddef>
 #include <string>
@@ -17,8 +18,8 @@ struct CalibrationRefusal {
   std::string why;  // begins with " (" or ": ", to follow "not calibrated yet"
 };
 
-// checked: must have a refusal. frames: the number of frames in its session. repeated_share: of the
-// pictures that came, those that were the one before.
+// checked: must have a refusal. frames: the number of frames in its session. repeated_share: share
+// of the pictures that repeated the picture before, 0 to 1.
 [[nodiscard]] CalibrationRefusal why_refused(const CheckedCalibration& checked, std::size_t frames,
                                              double repeated_share);
 

@@ -3,9 +3,9 @@
 // stamps and tracks of frames, telemetry, and some images (keyframes). Memory is bounded: whatever
 // exceeds the limits is forgotten, the oldest first.
 //
-// Every tenth frame is held out: a calibration of the session does not use it and is tested on it.
-// Its time is interpolated between its neighbours' times, by the sender's clock or by the sequence
-// numbers.
+// Every tenth frame is held out: a calibration of the session does not use this frame and is tested
+// on it. The frame's time is interpolated between its neighbours' times, by the sender's clock or
+// by the sequence numbers.
 // Radians, seconds, px. Allocates. One thread.
 
 #include <cstddef>
@@ -27,15 +27,15 @@
 namespace alidade {
 
 struct SessionLimits {
-  double window_s = 40;  // s, of frames
+  double window_s = 40;  // span of the frames' receive times
   std::size_t max_frames = 1500;
   std::size_t max_keyframes = 16;
   // Bytes of all packed keyframes: eight of 1080 lines. One keyframe stays in any case.
   std::size_t max_keyframe_bytes = std::size_t{10} << 20;
-  std::size_t max_samples = 20000;  // of telemetry; without frames nothing else bounds it
-  // s, kept before the first frame: the clock offset may be as large.
+  std::size_t max_samples = 20000;  // of telemetry; without frames nothing else bounds their number
+  // Telemetry is kept from this time before the first frame: the clock offset may be as large.
   double telemetry_margin_s = 2;
-  double keyframes_apart = 0.3;  // fields of view
+  double keyframes_apart = 0.3;  // least distance of two keyframes' directions, in fields of view
 };
 
 class CalibrationSession {
@@ -56,20 +56,20 @@ class CalibrationSession {
 
   [[nodiscard]] bool empty() const { return frames_.empty(); }
   [[nodiscard]] std::size_t frames() const { return frames_.size(); }
-  // By receive times, s; 0 without frames.
+  // By the frames' receive times: newest minus oldest; the newest. 0 without frames.
   [[nodiscard]] double span_s() const;
   [[nodiscard]] double newest_s() const;
 
-  // Frames are in order of arrival.
+  // Of the frames, in order of arrival.
   [[nodiscard]] std::vector<FrameStamp> stamps() const;
   [[nodiscard]] std::vector<PanTiltSample> telemetry() const;
   [[nodiscard]] std::vector<CalibrationObservation> observations() const;
 
-  // By the frame's index among the stamps.
+  // place: the frame's index among the stamps.
   [[nodiscard]] static bool is_held_out(std::size_t place);
-  // Times of the frames that the result used, and of each held-out frame between two of those.
+  // Times of the frames that the result used, and of each held-out frame between two of them.
   [[nodiscard]] FrameTimes frame_times(const CalibrationResult& result) const;
-  // Images of frames that have a time.
+  // The images of frames that have a time in the result.
   [[nodiscard]] std::vector<Keyframe> keyframes(const CalibrationResult& result) const;
 
  private:

@@ -4,15 +4,16 @@
 //   counts    Frames are counted by sequence number, else by sender times if these lie on a steady
 //             grid. Without either only their receive times are used. Telemetry likewise (sequence,
 //             device time).
-//   polls     A polled sample has no clock of its own. It was true in the middle of
+//   polls     A polled sample has no clock of its own. Its time is the middle of
 //             [earliest_time_s, latest_time_s], with sigma = width / sqrt(12). Each poll has an
-//             error of its own, and all share one: a device answers at a fixed place.
+//             error of its own, and one error is common to all: a device answers at a fixed place
+//             of the interval.
 //   repeats   Repeats of an old angle while the head turned say nothing of their own time. They are
 //             left out (stale_repeats.h).
 //   noise     Receive times err to both sides if the input's noise has a stamp sigma. Otherwise
 //             they are only ever late, as in `run` and `replay`.
-//   restarts  A sender's clock restarts at a reconnection: only the longest part without one is
-//             used.
+//   restarts  A sender's clock restarts at a reconnection: only the longest part without a
+//             reconnection is used.
 
 #include <string>
 #include <vector>
@@ -29,8 +30,8 @@ namespace alidade {
 // time.
 [[nodiscard]] double stamp_of(const PanTiltSample& sample, bool polled);
 
-// Appends frames to input->frames, sets what is known of their stamps in *options, and adds a line
-// to *remarks for whatever was left out.
+// Appends frames to input->frames (samples to input->telemetry), sets what is known of their stamps
+// in *options and in input->noise, and adds a line to *remarks for whatever was left out.
 void add_frames(std::vector<FrameStamp> stamps, CalibrationInput* input,
                 CalibrationOptions* options, std::vector<std::string>* remarks);
 void add_telemetry(std::vector<PanTiltSample> samples, CalibrationInput* input,

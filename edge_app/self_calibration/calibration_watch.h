@@ -1,6 +1,6 @@
 #pragma once
-// Judges that tell when a published calibration no longer fits the camera. Each keeps a short
-// memory.
+// Judges that tell when a published calibration no longer fits the camera. Each remembers only the
+// latest verdicts.
 // Seconds of the host's clock. Allocates little. One thread.
 
 #include <algorithm>
@@ -13,15 +13,19 @@ namespace alidade {
 
 // Compares calibrations of later motion with the published one.
 struct ContradictionOptions {
-  // Chi-square of the difference (calibration_difference.h): for 8 parameters 99.9 % lie below 26.
-  // The sigmas may be 1.5 times too small.
+  // A larger chi-square of the difference (calibration_difference.h) contradicts. For 8 parameters
+  // 99.9 % lie below 26; the limit is 1.5^2 times as large, as sigmas may be 1.5 times too small.
   double least_chi_square = 60;
   int believed_after = 2;  // contradictions in a row: a single one may be chance
 };
 
 class ContradictionJudge {
  public:
-  enum class Verdict { kAgrees, kContradicts, kBelieved };
+  enum class Verdict {
+    kAgrees,
+    kContradicts,  // not often enough in a row to be believed
+    kBelieved      // the calibration is contradicted
+  };
 
   explicit ContradictionJudge(const ContradictionOptions& options = {}) : options_(options) {}
 
@@ -33,7 +37,7 @@ class ContradictionJudge {
     }
     return ++in_a_row_ >= options_.believed_after ? Verdict::kBelieved : Verdict::kContradicts;
   }
-  // The chi-square of the last one, if it contradicted and was not believed yet.
+  // The latest chi-square, if it contradicted and was not believed yet.
   [[nodiscard]] std::optional<double> pending() const {
     return in_a_row_ > 0 && in_a_row_ < options_.believed_after ? std::optional(chi_square_)
                                                                 : std::nullopt;
@@ -46,11 +50,11 @@ class ContradictionJudge {
   int in_a_row_ = 0;
 };
 
-// Counts frames in which landmarks contradict telemetry. If half of the frames of some seconds do,
-// the calibration is withdrawn.
+// Counts frames in which landmarks contradict telemetry. If they do in half of the frames of some
+// seconds, the calibration is withdrawn.
 struct DisagreementOptions {
-  double span_s = 8;              // s
-  double share = 0.5;             // of the frames in span_s
+  double span_s = 8;              // the frames of this latest time are judged
+  double share = 0.5;             // of these frames, 0 to 1
   std::size_t least_frames = 40;  // fewer are not judged
 };
 
@@ -58,7 +62,7 @@ class DisagreementJudge {
  public:
   explicit DisagreementJudge(const DisagreementOptions& options = {}) : options_(options) {}
 
-  // True: withdraw the calibration. time_s: in order.
+  // True: the calibration must be withdrawn. time_s: not decreasing from call to call.
   bool judge(double time_s, bool contradicted) {
     frames_.emplace_back(time_s, contradicted);
     while (frames_.front().first < time_s - options_.span_s) frames_.pop_front();

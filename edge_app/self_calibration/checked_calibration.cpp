@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <unordered_map>
 #include <utility>
 #include <vector>
@@ -92,8 +93,10 @@ std::vector<CalibrationObservation> take_held_out(
 }
 
 // Empty: not refused.
-std::string refusal_of(const CalibrationQuality& quality, double hold_out, double unit,
-                       const CalibrationChecks& checks) {
+std::string refusal_of(const CalibrationQuality& quality, std::optional<double> held_out,
+                       double unit, const CalibrationChecks& checks) {
+  if (!held_out) return "no landmark was seen in a frame held out, so nothing tells how good it is";
+  const double hold_out = *held_out;
   if (hold_out > checks.worst_hold_out * unit) {
     return fmt::format(
         "landmarks in frames that were held out lie {:.1f} sigmas from where they should",
@@ -150,7 +153,7 @@ CheckedCalibration calibrate_session(const CalibrationSession& session,
   checked.hold_out = held_out_error(held_out, session.frame_times(result), result);
   const double unit = std::max(1.0, result.quality.pixel_sigma_ratio);
   checked.refusal = refusal_of(result.quality, checked.hold_out, unit, options.checks);
-  const double excess = std::max(1.0, checked.hold_out / unit);
+  const double excess = checked.hold_out ? std::max(1.0, *checked.hold_out / unit) : 1;
   checked.adjustment = std::move(calibrated.options);
   checked.common_clock_sigma_s = common_s;
   if (!(checked.adjustment.centre_sigma_px > 0) ||

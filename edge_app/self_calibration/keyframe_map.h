@@ -1,9 +1,9 @@
 #pragma once
-// The landmark map that belongs to a calibration, made from some images (keyframes) of its
-// recording. OeMode runs over the keyframes with the calibration's trajectory in place of
-// telemetry. So the map lies in the base frame, to a fraction of a pixel. Its offset covariance
-// includes that of the tie to the base (tie_covariance()), and its shear covariance says how far
-// the trajectory's rates and accelerations may be wrong. Derivation: docs/derivations.md.
+// The landmark map that belongs to a calibration, made from some images (keyframes) of the
+// calibration's recording. OeMode runs over the keyframes with the calibration's trajectory in
+// place of telemetry. So the map lies in the base frame, to a fraction of a pixel. The map's offset
+// covariance includes tie_covariance(); its shear covariance says how far the trajectory's rates
+// and accelerations may be wrong. Derivation: docs/derivations.md.
 // Angles rad, times s on the image clock. Pure; allocates; about 10 ms a keyframe. Not for the
 // real-time thread.
 
@@ -19,7 +19,7 @@ namespace alidade {
 
 struct Keyframe {
   double time_s = 0;  // s, image clock, of row 0
-  // Passed over if null, or not of the calibration's size.
+  // A keyframe is left out if this is null, or not of the calibration's size.
   std::shared_ptr<const PackedImage> image;
 };
 
@@ -27,9 +27,9 @@ struct Keyframe {
 [[nodiscard]] MapState map_from_keyframes(const CalibrationResult& result,
                                           const std::vector<Keyframe>& keyframes);
 
-// What the trajectory says at a time, as telemetry would measure it (angles times scale), for
-// OeMode::process(). sigma_px: of the angles, in the image. The sigma of the rates is 20 times that
-// per second.
+// The trajectory at a time (image clock), as telemetry would measure it (angles times scale), for
+// OeMode::process(). sigma_px: sigma of the angles as a motion of the image. The sigma of the rates
+// is 20 times the angles' per second.
 [[nodiscard]] InterpolatedPanTilt predict(const CalibrationResult& result, double time_s,
                                           double sigma_px);
 

@@ -10,7 +10,7 @@ namespace alidade {
 class MessageList {
  public:
   void say(const std::string& line) { lines_.push_back(line); }
-  // Unless it is the line that say_once() said last.
+  // Says the line unless it is the one that say_once() said last.
   void say_once(const std::string& line) {
     if (line == said_) return;
     said_ = line;

@@ -17,10 +17,11 @@ class PackedImage {
   // uncompressed.
   explicit PackedImage(const ImageView& image);
 
-  [[nodiscard]] int width() const { return width_; }
-  [[nodiscard]] int height() const { return height_; }
+  [[nodiscard]] int width() const { return width_; }    // px
+  [[nodiscard]] int height() const { return height_; }  // px
   [[nodiscard]] std::size_t bytes() const { return bytes_.size(); }
-  // Unpacks into *pixels, rows without gaps. An image that was never packed is empty and not valid.
+  // Unpacks into *pixels, rows without gaps; the view is lent with *pixels. If nothing was packed,
+  // the view is not valid.
   [[nodiscard]] ImageView unpack(std::vector<std::uint8_t>* pixels) const;
 
  private:

@@ -1,7 +1,7 @@
 #pragma once
 // PresentZoom: the zoom at which the camera stands, from readings as they come. Jitter is removed
-// (steady_zoom.h), and a reading that differs for less than zoom_glitch_s is left out. One that is
-// missing leaves the zoom as it was.
+// (steady_zoom.h), and readings that differ for less than zoom_glitch_s are left out. A sample
+// without a reading leaves the zoom as it was.
 // Seconds of the host's clock. Does not allocate. One thread.
 
 #include <cmath>
@@ -17,12 +17,12 @@ class PresentZoom {
  public:
   enum class Change {
     kNone,
-    kSilent,  // no reading for zoom_silence_s, though there were some
-    kJitter,  // jitter is known now: what were taken for other zooms were this one
+    kSilent,  // no reading for zoom_silence_s, though there were some before
+    kJitter,  // the jitter is known now: readings that were taken for other zooms were this one
     kSame,    // a reading of this zoom
-    kGlitch,  // such a reading, behind others
+    kGlitch,  // a reading of this zoom, after others for less than zoom_glitch_s
     kFirst,   // the first zoom
-    kMoved    // another zoom; each reading of a movement is one
+    kMoved    // another zoom; each reading of a movement is another zoom
   };
 
   // tolerance: see SteadyZoom.
@@ -35,20 +35,21 @@ class PresentZoom {
 
   // Empty until there is one. Device units.
   [[nodiscard]] const std::optional<double>& reading() const { return reading_; }
-  // Whether this is the zoom, as far as both are known.
+  // Whether the present zoom is `wanted`; true if one of them is not known.
   [[nodiscard]] bool fits(const std::optional<double>& wanted) const {
     return !reading_ || !wanted || std::abs(*reading_ - *wanted) <= steady_.tolerance();
   }
-  // False while the zoom may just pass by ...
+  // False while the zoom may just pass by this reading.
   [[nodiscard]] bool has_arrived(double now_s) const {
     return !(now_s < changed_s_ + schedule_.zoom_arrives_s);
   }
-  // ... and while frames may still show another zoom.
+  // False while frames may still show another zoom. time_s: of the frame.
   [[nodiscard]] bool has_settled(double time_s) const {
     return !(time_s < changed_s_ + schedule_.zoom_settles_s);
   }
-  [[nodiscard]] double sigma() const { return steady_.sigma(); }          // device units
-  [[nodiscard]] double tolerance() const { return steady_.tolerance(); }  // the same
+  // Device units: sigma of the jitter; readings no further apart than the tolerance are one zoom.
+  [[nodiscard]] double sigma() const { return steady_.sigma(); }
+  [[nodiscard]] double tolerance() const { return steady_.tolerance(); }
 
  private:
   SteadyZoom steady_;

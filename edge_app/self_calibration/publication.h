@@ -1,7 +1,7 @@
 #pragma once
-// Publication: the calibration that the real-time thread has or gets next, and its state: whether
-// its clock offset holds, whether it was withdrawn, whether another one is wanted. Allocates. One
-// thread.
+// Publication: the calibration that the real-time thread has or gets next, and the state of this
+// calibration: whether its clock offset holds, whether it was withdrawn, whether another one is
+// wanted. begin_with() comes first. Allocates. One thread.
 
 #include <algorithm>
 #include <memory>
@@ -16,28 +16,28 @@ class Publication {
  public:
   using Object = std::shared_ptr<const PublishedCalibration>;
 
-  // What the real-time thread begins with.
+  // The calibration with which the real-time thread begins; not null.
   void begin_with(Object first) {
     present_ = std::move(first);
     clock_holds_ = present_->of_this_connection;
   }
-  // A calibration takes the place of the present one.
+  // `by` takes the place of the present calibration.
   void replace(Object by) {
     present_ = next_ = std::move(by);
     clock_holds_ = present_->of_this_connection;
     is_withdrawn_ = false;
     is_fresh_wanted_ = false;
   }
-  // The present one with other sigmas.
+  // by: the present calibration with other sigmas.
   void widen(Object by) { present_ = next_ = std::move(by); }
-  // The present one is no longer believed. by: what replaces it, not calibrated. The stored one of
-  // its zoom is rejected.
+  // The present calibration is no longer believed. by: takes its place and is not calibrated. The
+  // stored calibration of the present one's zoom is rejected.
   void withdraw(Object by) {
     if (present_->calibration.zoom) rejected_.push_back(*present_->calibration.zoom);
     present_ = next_ = std::move(by);
     is_withdrawn_ = true;
   }
-  // What is to be published, once; null: nothing.
+  // The calibration to publish; null: there is nothing new since the last call.
   [[nodiscard]] Object take_next() { return std::exchange(next_, nullptr); }
 
   [[nodiscard]] const Object& object() const { return present_; }
@@ -52,6 +52,7 @@ class Publication {
   [[nodiscard]] bool is_fresh_wanted() const { return is_fresh_wanted_; }
   void want_fresh(bool wanted) { is_fresh_wanted_ = wanted; }
 
+  // Whether the stored calibration of this zoom (device units) was withdrawn.
   [[nodiscard]] bool is_rejected(double zoom) const {
     return std::find(rejected_.begin(), rejected_.end(), zoom) != rejected_.end();
   }

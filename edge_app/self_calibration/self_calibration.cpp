@@ -223,12 +223,13 @@ void SelfCalibration::publish(const CheckedCalibration& checked) {
   fresh->zoom_curve = nodes_.believed_curve();
   fresh->telemetry_error = checked.result.telemetry_error;
   const CalibrationQuality& quality = checked.result.quality;
+  const std::string held_out =
+      checked.hold_out ? fmt::format(", {:.2f} in frames held out", *checked.hold_out) : "";
   messages_.say(
       fmt::format("calibrated from {} frames, {} landmarks: {}; residuals {:.2f} of the tracker's "
-                  "noise, {:.2f} "
-                  "in frames held out; map of {} landmarks",
+                  "noise{}; map of {} landmarks",
                   quality.frames, quality.landmarks, describe(fresh->calibration),
-                  quality.pixel_sigma_ratio, checked.hold_out, fresh->map.landmarks.size()));
+                  quality.pixel_sigma_ratio, held_out, fresh->map.landmarks.size()));
   for (const std::string& line : quality.describe_departures()) {
     messages_.say("what was filmed contradicts the model: " + line);
   }

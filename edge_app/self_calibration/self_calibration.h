@@ -1,12 +1,12 @@
 #pragma once
 // SelfCalibration: the work of the calibration thread. Pure: no thread, no clock of its own, no
 // files except through the CalibrationArchive; a simulation runs it step by step. It collects
-// tracks, telemetry and keyframes of the latest motion; calibrates as soon as new data promises
-// more than the last try, and publishes the result, with its map, if it passes the checks; tests it
-// against later motion, refines it or withdraws it. Each zoom has its own calibration; those of
-// several zooms become nodes of a zoom curve. While the video's delay wanders, nothing is
-// calibrated or withdrawn; what was just contradicted is widened.
-// Step by step: docs/derivations.md. Allocates; work() takes seconds. One thread.
+// tracks, telemetry and keyframes of the latest motion. As soon as new data promises more than the
+// last try, it calibrates; a result that passes the checks is published with its map. It tests the
+// published calibration against later motion, refines it or withdraws it. Each zoom has its own
+// calibration; those of several zooms become nodes of a zoom curve. While the video's delay
+// wanders, nothing is calibrated or withdrawn; a calibration that was just contradicted gets larger
+// sigmas. Step by step: docs/derivations.md. Allocates; work() takes seconds. One thread.
 
 #include <atomic>
 #include <memory>
@@ -40,13 +40,13 @@ struct SelfCalibrationOptions {
   CalibrationNoise noise;
   // Device units: readings no further apart are one zoom. Empty: found from their jitter.
   std::optional<double> zoom_tolerance;
-  bool zooms = false;  // known beforehand to zoom; else the second reading shows it
+  bool zooms = false;  // the camera is known to zoom; if not, a second reading will show it
   SessionLimits session;
   CalibrationSchedule schedule;
   CalibrationChecks checks;
   ContradictionOptions contradiction;
   DisagreementOptions disagreement;
-  bool automatic = true;  // false: stored calibrations only
+  bool automatic = true;  // false: only stored calibrations are used
 };
 
 class SelfCalibration {
@@ -54,7 +54,7 @@ class SelfCalibration {
   // archive: borrowed; null: nothing is stored.
   SelfCalibration(const SelfCalibrationOptions& options, CalibrationArchive* archive);
 
-  // What the real-time thread begins with: the stored calibration, else the data sheet's.
+  // The calibration with which the real-time thread begins: the stored one, else the data sheet's.
   [[nodiscard]] std::shared_ptr<const PublishedCalibration> first() const {
     return publication_.object();
   }
@@ -69,17 +69,18 @@ class SelfCalibration {
 
   // Whether work() would compute something.
   [[nodiscard]] bool due() const;
-  // Does what is due. Null if nothing is to be published.
+  // Does what is due. Returns the calibration to publish; null: nothing is to be published.
   [[nodiscard]] std::shared_ptr<const PublishedCalibration> work();
 
   [[nodiscard]] CalibrationReport report() const;
-  // Thread-safe. Asks for a calibration of the motion from now on. It replaces the present one as
-  // soon as it passes the checks of a first one. False: calibration is not automatic.
+  // Thread-safe. Asks for a new calibration, from the motion from now on. The new calibration
+  // replaces the present one as soon as it passes the checks of a first calibration. False:
+  // calibration is not automatic.
   [[nodiscard]] bool ask_for_fresh();
 
   // Thread-safe. Every work(), present or later, soon ends without a result.
   void cancel();
-  // New lines for the log: what was found, why something was refused.
+  // The lines for the log since the last call: what was found, why something was refused.
   [[nodiscard]] std::vector<std::string> take_messages() { return messages_.take(); }
 
  private:
@@ -117,8 +118,8 @@ class SelfCalibration {
   void store(const CalibrationResult& result, const MapState& map);
 
   // The first zoom's calibration once more, with a free optical centre. It becomes a node if
-  // another zoom follows. It is made while its motion is at hand: keeping that would take more
-  // memory than everything else here.
+  // another zoom follows. It is made while its motion is at hand: keeping the motion would take
+  // more memory than everything else here.
   struct FirstNode {
     std::string refusal;       // empty: it may become a node
     CalibrationResult result;  // only calibration, quality and exclusions are set

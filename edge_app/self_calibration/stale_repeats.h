@@ -3,12 +3,12 @@
 //
 // A device that is polled faster than it measures repeats its last value. The value was true when
 // it first came. If the head has turned meanwhile, the repeat is stale: it says nothing of its own
-// time. A run of equal values is stale after its first sample if the samples around it show that
-// the head turned on. In doubt a sample is not stale. Derivation: docs/derivations.md. These
-// functions need finished data: `calibrate`, the calibration thread and `check` use them. The
-// real-time step cannot wait; TelemetryBuffer takes every repeat younger than pan_tilt.max_repeat_s
-// as unknown instead. Both take a value as true when it first came, so a clock offset found with
-// one holds for the other.
+// time. In a run of equal values, all but the first sample are stale if the samples around the run
+// show that the head turned on. In doubt a sample is not stale. Derivation: docs/derivations.md.
+// These functions need the whole data: `calibrate`, the calibration thread and `check` use them.
+// The real-time step cannot wait: TelemetryBuffer takes every repeat younger than
+// pan_tilt.max_repeat_s as unknown. Both take a value as true when it first came, so a clock offset
+// found with one holds for the other.
 // Radians, seconds; a sample's time is the middle of its interval. Pure functions; they allocate.
 
 #include <cstddef>
@@ -18,16 +18,18 @@
 
 namespace alidade {
 
-// The largest step q such that differences between the angles of one axis are whole multiples of
-// it: when the angles are sorted, 19 of 20 gaps between neighbours lie within 3 % of q of a
-// multiple. Printed digits and single wild angles do not matter. 0: none, or too little motion to
-// tell. (core/calibration/initialization.h asks for more: every step has to be a whole multiple.)
+// The largest step q (rad) of which the differences between the angles of one axis are whole
+// multiples: when the angles are sorted, 19 of 20 gaps between neighbours are within 3 % of q of a
+// multiple. Printed digits and single wild angles do not matter. 0: no such step, or too little
+// motion to tell. (angle_resolution() in core/calibration/rounded_telemetry.h is stricter: every
+// reading must be a multiple.)
 [[nodiscard]] double device_resolution(const std::vector<double>& angles_rad);
 
-// For each sample, in order of time. The first sample after a reconnection repeats nothing.
+// Whether each sample is a stale repeat. samples: in order of time. The first sample after a
+// reconnection repeats nothing.
 [[nodiscard]] std::vector<bool> find_stale_repeats(const std::vector<PanTiltSample>& samples);
 
-// The time of a sample that was true somewhere in its interval, s.
+// The time of a sample, s: the middle of its interval.
 [[nodiscard]] inline double middle_time_s(const PanTiltSample& sample) {
   return 0.5 * (sample.earliest_time_s + sample.latest_time_s);
 }
@@ -37,6 +39,7 @@ struct EqualRun {
   std::size_t begin = 0;
   std::size_t end = 0;
 };
+// All samples, in order; a run may have one sample.
 [[nodiscard]] std::vector<EqualRun> equal_runs(const std::vector<PanTiltSample>& samples);
 
 }  // namespace alidade

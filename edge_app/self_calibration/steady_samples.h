@@ -15,8 +15,8 @@ struct ZoomJitter {
   double tolerance = 0;  // device units: readings no further apart are one zoom
 };
 
-// tolerance: device units, as set by the user, and nothing is changed; empty: it is found. samples:
-// in order of time.
+// tolerance: device units, as the user sets it; the samples then stay as they are. Empty: it is
+// found. samples: in order of time.
 ZoomJitter steady_zoom(std::optional<double> tolerance, std::vector<PanTiltSample>* samples);
 
 }  // namespace alidade

@@ -20,19 +20,20 @@ class StreamWatch {
 
   void add(const FrameTracks& tracks);
   void add(const PanTiltSample& sample);
+  // The stream is lost.
   void lose_video() { video_is_lost_ = true; }          // until the next frame
   void lose_telemetry() { telemetry_is_lost_ = true; }  // until the next sample
 
-  // Judges the delay by this frame. True if it has begun or ceased to wander.
+  // Judges the delay by this frame. True if the delay has begun or ceased to wander.
   [[nodiscard]] bool judge_delay(const FrameTracks& tracks);
   [[nodiscard]] bool delay_wanders() const { return delay_wanders_; }
 
-  // Of the latest frames, how many had a picture that was sent again.
+  // Share of the latest frames whose picture was sent again, 0 to 1.
   [[nodiscard]] double repeated_share() const;
 
   // The latest receive time of either stream.
   [[nodiscard]] double now_s() const { return now_s_; }
-  // What must become better before anything is calibrated or withdrawn; empty: nothing.
+  // What must improve before anything is calibrated or withdrawn; empty: nothing.
   [[nodiscard]] std::optional<CalibrationNeed> unsteady() const;
   // The stream that does not come; empty: both come.
   [[nodiscard]] std::optional<CalibrationNeed> missing() const;

@@ -1,6 +1,6 @@
 #pragma once
-// TryPace: when the data of a session is worth another adjustment. Tries that fail become rarer,
-// and so do those that hold a calibration against later motion, as long as it agrees.
+// TryPace: when the data of a session is worth another adjustment. Tries become rarer while they
+// fail. Tests of a calibration against later motion become rarer while it agrees.
 // Seconds of the frames' receive times. Does not allocate. One thread.
 
 #include <algorithm>
@@ -15,38 +15,38 @@ class TryPace {
   explicit TryPace(const CalibrationSchedule& schedule)
       : schedule_(schedule), watch_interval_s_(schedule.first_watch_s) {}
 
-  // The session is empty again ...
+  // The session is empty again.
   void begin_anew() { tries_ = 0; }
-  // ... and this is its first frame.
+  // The session got its first frame, at this time.
   void begin(double time_s) { began_s_ = last_try_s_ = time_s; }
 
-  // For the data that the session has now.
+  // A try was made with the data that the session has now.
   void note_try(const CalibrationSession& session) { last_try_s_ = session.newest_s(); }
-  // The try is for a calibration where there is none.
+  // This try was for a first calibration.
   void note_first() { ++tries_; }
   [[nodiscard]] bool has_tried() const { return tries_ > 0; }
 
-  // The next look at the calibration is after `pause_s`, then after twice that, and so on.
+  // The next test of the calibration comes after `pause_s`.
   void watch_after(double pause_s) { watch_interval_s_ = pause_s; }
   void watch_soon() { watch_after(schedule_.first_watch_s); }
   void watch_later() {
     watch_interval_s_ = std::min(2 * watch_interval_s_, schedule_.longest_watch_s);
   }
 
-  // Whether to try for a calibration where there is none ...
+  // Whether a try for a first calibration is due.
   [[nodiscard]] bool first_is_due(const CalibrationSession& session) const {
     const double pause_s =
         tries_ < schedule_.many_tries ? schedule_.next_try_s : schedule_.slow_try_s;
     return session.span_s() >= schedule_.first_try_s &&
            (!has_tried() || session.newest_s() >= last_try_s_ + pause_s);
   }
-  // ... for the node of a dwell that has none ...
+  // Whether a try for the node of a dwell that has none is due.
   [[nodiscard]] bool node_is_due(const CalibrationSession& session) const {
     return session.span_s() >= schedule_.first_try_s &&
            session.newest_s() >= last_try_s_ + watch_interval_s_;
   }
-  // ... and to hold a calibration against later motion. soon: its clock offset is of an earlier
-  // connection.
+  // Whether a test of a calibration against later motion is due. soon: it must not wait, as the
+  // calibration's clock offset is of an earlier connection.
   [[nodiscard]] bool watch_is_due(const CalibrationSession& session, bool soon) const {
     const double newest_s = session.newest_s();
     return session.span_s() >= schedule_.watch_window_s &&

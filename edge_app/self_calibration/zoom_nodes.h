@@ -1,10 +1,10 @@
 #pragma once
 // ZoomNodes: the calibrations of a camera that zooms, as they come. The first one stands alone;
 // from the second reading on they are the nodes of a zoom curve (core/calibration/zoom_fit.h). Each
-// dwell between two zoom movements has a node of its own, which later calibrations of the same
-// dwell sharpen. A calibration is added only if line delay, axes and clock offset agree with the
-// others within chance. A new connection has another clock offset: that of the nodes is ignored
-// until a calibration is added. Pure; allocates. One thread.
+// dwell between two zoom movements has a node of its own; later calibrations of the same dwell
+// sharpen the node. A calibration is added only if line delay, axes and clock offset agree with the
+// others within chance. A new connection has another clock offset: the clock offset of the nodes is
+// then ignored until a calibration is added. Pure; allocates. One thread.
 
 #include <optional>
 #include <string>
@@ -28,8 +28,8 @@ struct ZoomAddition {
 
 class ZoomNodes {
  public:
-  // What is stored: the curve, else perhaps a calibration with a free optical centre. It is of
-  // another connection.
+  // The stored curve; if it is empty, `first` may be a stored calibration with a free optical
+  // centre (null: there is none). Both are of another connection.
   void begin_with(const ZoomCurve& curve, const Calibration* first);
 
   // All nodes that were taken, also while they are doubted.
@@ -39,6 +39,7 @@ class ZoomNodes {
   [[nodiscard]] bool empty() const { return curve_.empty() && !first_; }
   // Whether this dwell has a node already.
   [[nodiscard]] bool has_visit() const { return visited_; }
+  // Whether the clock offset of the nodes is that of this connection.
   [[nodiscard]] bool clock_is_known() const { return clock_is_known_; }
 
   void leave();  // the zoom has moved
@@ -47,14 +48,14 @@ class ZoomNodes {
   // until a new calibration has been found to agree with them (take()), or stands alone.
   void doubt() { is_doubted_ = true; }
 
-  // alone: from the data of this dwell, none of which was added before; its zoom is set. options:
-  // the priors that went into it. False, with one line in *error: it does not belong to this
-  // camera, or makes no curve.
+  // Computes *addition without accepting it. alone: a calibration from data of this dwell that were
+  // not added before; its zoom is set. options: with the priors that `alone` used. False, with one
+  // line in *error: the calibration does not belong to this camera, or makes no curve.
   [[nodiscard]] bool add(const Calibration& alone, ZoomFitOptions options, ZoomAddition* addition,
                          std::string* error) const;
-  // Accepts the addition.
+  // Accepts an addition.
   void take(const ZoomAddition& addition);
-  // Forgets all others.
+  // Forgets all calibrations but `alone`, which becomes the first.
   void begin_anew(const Calibration& alone);
 
  private:

@@ -2,8 +2,8 @@
 // FrameLandmarks: what the real-time thread saw in one frame, for display.
 //   landmark  of OE mode: where the solution expects it, and its residual, found minus expected
 //   point     of an uncalibrated camera: where it was found; nothing is expected
-// px of the full image (CONVENTIONS.md). An edge is located across itself only: its residual has no
-// part along the edge. Fixed size and trivially copyable: crosses a queue by value.
+// px of the full image (CONVENTIONS.md). The place of an edge is known across the edge only: the
+// residual has no part along it. Fixed size and trivially copyable: crosses a queue by value.
 
 #include <array>
 #include <cstdint>

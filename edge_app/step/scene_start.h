@@ -4,9 +4,9 @@
 //   R_base_from_camera(now) = R_base_from_camera(asked) R_asked_from_now
 // ask() chooses a frame, another thread localizes it, and settle() delivers the result some frames
 // later. TurnChain knows how the camera turned meanwhile. The output replaces telemetry for OE
-// mode: pan and tilt of the mount when the middle row is exposed, and their rates. All outputs
-// since one picture share its error, which correlation_time_s says. Fixed memory; no allocation.
-// One thread.
+// mode: pan and tilt of the mount when the middle row is exposed, and their rates. All outputs that
+// rest on one localized picture share its error; their correlation_time_s allows for it. Fixed
+// memory; no allocation. One thread.
 
 #include <cstdint>
 #include <optional>
@@ -19,10 +19,10 @@ namespace alidade {
 
 class SceneStart {
  public:
-  // Call for each frame that landmarks do not answer, in order.
+  // To be called for each frame that landmarks do not answer, in order.
   void add(const Calibration& calibration, const FrameTracks& tracks);
-  // The frame added last is to be localized. *angular_velocity: rad/s, its camera frame. False: it
-  // cannot be followed from there.
+  // The frame added last is to be localized. *angular_velocity: rad/s, its camera frame. False: the
+  // camera cannot be followed from this frame on.
   [[nodiscard]] bool ask(std::int64_t frame, Vector3<double>* angular_velocity);
   void settle(const ToldBase& told);
   void forget();

@@ -1,7 +1,7 @@
 #pragma once
 // ToldBase: the localization thread's result for one frame, for the real-time thread: by how much
-// the frame's record is off in the scene map's base; or, if the record has no orientation, where it
-// looked. Fixed size and trivially copyable: crosses the queue by value.
+// the frame's record is off in the scene map's base; or, if the record has no orientation, where
+// the camera looked. Fixed size and trivially copyable: crosses the queue by value.
 
 #include <array>
 #include <cstdint>

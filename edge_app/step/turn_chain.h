@@ -2,8 +2,9 @@
 // TurnChain: how a camera has turned since some frame, without telemetry, by points followed from
 // frame to frame (start_up_tracker.h). For each point with ray b in the camera frame:
 //   b_before = Exp(s w) b_now,  s = 1 + l (v_now - v_before) / T
-// w is the rotation vector from this frame's middle row to that of the frame before, T the time
-// between them. l is the line delay: a rolling shutter that turns at an even rate does no harm.
+// w is the rotation vector from this frame's middle row to the middle row of the frame before, T
+// the time between the two. l is the line delay: a rolling shutter that turns at an even rate does
+// no harm.
 // Robust least squares (Cauchy): points that move by themselves count little. The steps multiply,
 // R_from_now = R_from_before Exp(w), with the covariance of all steps, of R Exp(xi), xi in this
 // frame's camera frame. A step with too few points, or after too long a time, breaks the chain.

@@ -9,7 +9,7 @@
 namespace alidade {
 
 // False: one line in *error: `path: cannot be read: why`, or what is wrong in which line. curve,
-// telemetry_error (if not null): get the file's; empty if there is none.
+// telemetry_error: may be null; else set to the file's, or to an empty one if the file has none.
 [[nodiscard]] bool load_calibration(const std::string& path, Calibration* calibration,
                                     std::string* error, ZoomCurve* curve = nullptr,
                                     TelemetryError* telemetry_error = nullptr);

@@ -2,9 +2,9 @@
 // CalibrationStore: the calibrations of one camera on disk, one for each zoom setting, each with
 // its map.
 //   FILE                   the calibration without zoom (calibration.file of the configuration)
-//   STEM.zoom-1234.5.yaml  the one at that zoom, beside it. The zoom inside the file counts, not
-//                          its name.
-//   *.map-1a2b3c4d.bin     the map that a yaml names, beside it, tied to it by checksum
+//   STEM.zoom-1234.5.yaml  the calibration at zoom 1234.5 (device units), beside FILE. The zoom
+//                          inside the file counts, not the zoom in its name.
+//   *.map-1a2b3c4d.bin     the map that a yaml names, beside the yaml, tied to it by checksum
 //                          (map_file.h)
 // A damaged file is set aside and logged, never used. Files are written atomically: a power cut
 // leaves the old calibration and map, or the new ones. Where the zoom curve is, and the order of
@@ -21,7 +21,8 @@
 
 namespace alidade {
 
-// A curve also continues beyond its first and last zoom, with less certainty.
+// Whether a zoom reading (device units) lies between the curve's first and last zoom. Beyond these
+// the curve continues, with less certainty.
 [[nodiscard]] inline bool is_between_zooms(const ZoomCurve& curve, double reading) {
   return (reading - curve.first_reading()) * (reading - curve.last_reading()) <= 0;
 }
@@ -39,12 +40,12 @@ class CalibrationStore final : public CalibrationArchive {
   explicit CalibrationStore(std::string file, double zoom_tolerance = 0);
 
   // Reads all files. width, height: px of the video; 0: any size. Returns lines for the log: what
-  // was loaded, what was set aside and why. kLook: changes no file.
+  // was loaded, what was set aside and why. kLook: changes no file; a damaged file stays in place.
   enum class Use { kKeep, kLook };
   [[nodiscard]] std::vector<std::string> load(int width, int height, Use use = Use::kKeep);
 
-  // Call before load(): of several processes that kept their calibrations here, one would remove
-  // another's map.
+  // To be called before load(). Without the lock, one of several processes that keep calibrations
+  // under this name would remove another's map. On failure *why is one line.
   [[nodiscard]] FileLock::Result lock(std::string* why);
 
   [[nodiscard]] bool empty() const { return entries_.empty(); }
@@ -54,7 +55,7 @@ class CalibrationStore final : public CalibrationArchive {
   [[nodiscard]] bool save(const StoredCalibration& calibration, std::string* error) override;
   [[nodiscard]] bool has_pending() const override;
   [[nodiscard]] bool save_pending(std::string* error) override;
-  // Renames them to NAME.replaced, .replaced.1 ..., with their maps.
+  // Renames the calibrations with a zoom to NAME.replaced, .replaced.1 ..., with their maps.
   [[nodiscard]] std::string set_zooms_aside() override;
 
  private:

@@ -34,7 +34,7 @@ struct LensEstimate {
 // name: of the file, in errors.
 [[nodiscard]] bool parse_lens(const std::string& text, const std::string& name, LensEstimate* lens,
                               std::string* error);
-// The same for a file. One that cannot be read is an error, too.
+// The same for a file. A file that cannot be read is an error, too.
 [[nodiscard]] bool load_lens(const std::string& path, LensEstimate* lens, std::string* error);
 
 [[nodiscard]] std::string format_lens(const PatternCalibration& calibration,

@@ -1,9 +1,9 @@
 #pragma once
 // map.bin: what one calibration knows of the scene, beside its calibration.yaml: the points
-// adjusted with it, and OE mode's map. Its directions contain that calibration's errors, so it is
-// refused with any other calibration. Not for the real-time thread: allocates, reads and writes
-// files. No shared state. Little-endian, packed; sizes for a calibration without (with) an optical
-// centre of its own, which has 11 (13) parameters_of():
+// adjusted with the calibration, and OE mode's map. The map's directions contain the calibration's
+// errors, so a map is refused with any other calibration. Not for the real-time thread: allocates,
+// reads and writes files. No shared state. Little-endian, packed. Sizes are for a calibration of 11
+// parameters_of(); in brackets for one of 13, which has an optical centre of its own:
 //   offset 0   8 bytes  "ALIDMAP\n"
 //          8   u32      format version, 3
 //         12   u32      calibration_check() of the calibration it belongs to
@@ -28,8 +28,8 @@
 //                 22 f32  (26) sensitivity, by rows
 //                 4 f64   J_pixel_tangent, by rows
 //                 256 u8  image, by rows
-//                 u32     frames in which it was looked for
-//                 u32     frames in which it was found, no more than those
+//                 u32     number of frames in which it was looked for
+//                 u32     number of these in which it was found
 //                 f32     mean square of the normalised residual
 //        end   u32      CRC-32 of everything before
 // A later version may change anything after the version number. Earlier versions, without

@@ -20,7 +20,7 @@ namespace alidade {
 
 [[nodiscard]] bool parse_plane(const std::string& text, const std::string& name,
                                PlaneEstimate* estimate, std::string* error);
-// The same for a file. One that cannot be read is an error, too.
+// The same for a file. A file that cannot be read is an error, too.
 [[nodiscard]] bool load_plane(const std::string& path, PlaneEstimate* estimate, std::string* error);
 
 // The base's forward direction must not point straight up or down (kLeastForward), as it then has

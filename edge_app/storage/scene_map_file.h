@@ -3,9 +3,9 @@
 // this program's application_id. Columns: scene_map_schema.h. Numbers keep their bits; of a
 // covariance the upper half is kept. user_version is the format, 2. A map of format 1 is read and
 // updated as it is, and becomes format 2 when it is replaced. Each transaction is on disk when the
-// call returns (synchronous = FULL). After a power cut the map is as one of them left it, and none
-// that returned is lost. Checksums of the rows, and their sum in the scene row, reveal what SQLite
-// does not notice: a changed bit, a lost row. Not for the real-time thread.
+// call returns (synchronous = FULL). After a power cut the map is as a transaction left it, and no
+// transaction whose call returned is lost. Checksums of the rows, and their sum in the scene row,
+// reveal what SQLite does not notice: a changed bit, a lost row. Not for the real-time thread.
 
 #include <cstdint>
 #include <string>
@@ -21,7 +21,8 @@ namespace alidade {
 // All or nothing. Replaces a scene map, but neither another file nor a damaged map.
 [[nodiscard]] bool save_scene_map(const std::string& path, const SceneMap& map, std::string* error);
 
-// False: a file beside that place forbids a map there. Ask before minutes of work.
+// False with one line in *error: a file at or beside `path` forbids a map there. To be asked before
+// minutes of work.
 [[nodiscard]] bool may_write_scene_map(const std::string& path, std::string* error);
 
 // One thread at a time; several processes may read while one writes. An error is one line, `path:
@@ -43,13 +44,13 @@ class SceneMapFile {
   // False: the map belongs to a camera with another image size.
   [[nodiscard]] bool is_of(int width, int height, std::string* error) const;
 
-  // All from one moment. Without pictures the keyframes' pictures are empty; read_picture() reads
-  // one.
+  // Reads the whole map, all from one moment. Without pictures the keyframes' pictures are empty;
+  // read_picture() reads a single one.
   [[nodiscard]] bool read(SceneMap* map, std::string* error, bool with_pictures = false);
   [[nodiscard]] bool read_picture(std::int64_t keyframe, std::vector<std::uint8_t>* picture,
                                   std::string* error);
 
-  // One transaction. Refused if another process has written since this one read or wrote.
+  // One transaction. Refused if another process has written since this object read or wrote.
   [[nodiscard]] bool update(const MapChange& change, std::string* error);
   // Replaces the whole map by another one, which is_valid(), in one transaction.
   [[nodiscard]] bool replace(const SceneMap& map, std::string* error);

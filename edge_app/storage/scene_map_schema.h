@@ -12,7 +12,8 @@ namespace alidade {
 
 inline constexpr std::int64_t kSceneMapApplication = 0x414C534D;  // "ALSM"
 inline constexpr std::int64_t kSceneMapFormat = 2;
-// Can still be read: its lens keeps the distortion of the corner (LensCurve::hold() = 1).
+// The older format, which can still be read. Its lens keeps the distortion of the corner
+// (LensCurve::hold() = 1).
 inline constexpr std::int64_t kSceneMapFormatWithoutRest = 1;
 
 // For a file whose content makes no sense.
@@ -44,8 +45,8 @@ inline const std::array<std::string, 8> kSceneMapTables = {
     "u_px, v_px, scale_px, "
     "PRIMARY KEY(landmark, keyframe)) WITHOUT ROWID"};
 
-// Those of kSceneMapFormatWithoutRest. A file of that format has this text for ever, whatever
-// becomes of the tables above.
+// The tables of kSceneMapFormatWithoutRest. A file of that format keeps this text, whatever becomes
+// of the tables above.
 inline const std::array<std::string, 7> kSceneMapTablesWithoutRest = {
     "CREATE TABLE keyframe(id INTEGER PRIMARY KEY, recording, frame, time_utc_s, zoom, position, "
     "telemetry_pan, telemetry_tilt, "

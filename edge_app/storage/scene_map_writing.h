@@ -1,6 +1,7 @@
 #pragma once
 // Writes the tables of scene.map, row by row, and keeps sums and counts of the scene row up to
-// date. Call inside a transaction. A failure is the database's (SqliteDatabase::failed()); after a
+// date. For use inside a transaction. A failure is the database's (SqliteDatabase::failed()); after
+// a
 // failure nothing is written.
 
 #include <cstdint>
@@ -37,10 +38,10 @@ class SceneRows {
       find_landmark_, delete_sightings_, delete_landmark_;
 };
 
-// Into empty tables of this program's format.
+// Writes the whole map into empty tables of this program's format.
 void write_scene_map(const SceneMap& map, std::int64_t revision, SqliteDatabase* database);
 
-// with_rest: for the format that stores the lens's hold().
+// Checksum of a lens. with_rest: for the format that stores the lens's hold().
 [[nodiscard]] std::int64_t sum_of(const LensCurve& lens, bool with_rest);
 
 }  // namespace alidade

@@ -1,10 +1,10 @@
 #pragma once
 // RAII for SQLite's handles: a connection, a statement, a transaction. A connection keeps its first
-// failure until asked, and after it statements do nothing. So one check at the end covers many
-// steps. One thread at a time.
+// failure until it is asked for it; after a failure statements do nothing. So one check at the end
+// covers many steps. One thread at a time.
 // Changes go to a write-ahead log (NAME-wal, NAME-shm) or are unlogged. A rollback journal is never
-// written and never believed: one beside a database was put there by others, and SQLite would
-// delete the files that it names.
+// written and never believed: a journal beside a database was put there by others, and SQLite would
+// delete the files that the journal names.
 
 #include <cstddef>
 #include <cstdint>
@@ -18,8 +18,8 @@ struct sqlite3_stmt;
 
 namespace alidade {
 
-// A file beside a database that SQLite did not leave there for this program; empty: there is none.
-// foreign_file_text() words it for the user.
+// Path of a file beside a database that SQLite did not leave there for this program; empty: there
+// is none. foreign_file_text() makes it a line for the user.
 [[nodiscard]] std::string foreign_file_beside(const std::string& database);
 [[nodiscard]] std::string foreign_file_text(const std::string& file);
 
@@ -27,17 +27,18 @@ class SqliteDatabase {
  public:
   SqliteDatabase() = default;
 
-  // Opens an existing file, or makes one. True: opened; whether it is a database only the first
-  // statement shows. False also if there is a foreign_file_beside() it.
+  // Opens an existing file; with `create` makes one if there is none. True: opened; only the first
+  // statement shows whether the file is a database. False also if there is a foreign_file_beside()
+  // it.
   [[nodiscard]] bool open(const std::string& path, bool create);
   void close();
   [[nodiscard]] bool is_open() const { return handle_ != nullptr; }
 
   void execute(const std::string& sql);
-  // Of a `PRAGMA` or `SELECT` with one row and column. 0, or empty, if it fails.
+  // The value of a `PRAGMA` or `SELECT` with one row and column. 0, or empty, if it fails.
   [[nodiscard]] std::int64_t number_of(const std::string& sql);
   [[nodiscard]] std::string text_of(const std::string& sql);
-  // No longer text or blob is read or written.
+  // Texts and blobs longer than this are neither read nor written.
   void limit_length(int bytes);
 
   [[nodiscard]] bool failed() const { return failure_ != 0; }

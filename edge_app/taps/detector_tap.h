@@ -8,9 +8,10 @@
 //
 // Only frames in OE mode are handed over: detectors find motion by comparing pictures to a fraction
 // of a pixel, and telemetry alone is off by pixels at the long end of a zoom. The mailbox has one
-// place. A picture that is not taken before the next one is replaced and counted. Three frames in
-// fixed memory change owner by one atomic exchange (a triple buffer), so the real-time thread
-// neither waits nor allocates. The picture is lent with its slot, not copied.
+// place. A picture that is not taken before the next one comes is replaced and counted. Three
+// frames in fixed memory change owner by one atomic exchange (a triple buffer), so the real-time
+// thread neither waits nor allocates. The picture is lent with its slot, not copied: its memory
+// stays until the slot is returned.
 
 #include <array>
 #include <atomic>
@@ -32,7 +33,8 @@ struct DetectableFrame {
 };
 static_assert(std::is_trivially_copyable_v<DetectableFrame>);
 
-// The detector. Called by the detector thread alone.
+// The detector. look() is called by the detector thread alone; the frame's image is valid during
+// the call.
 class FrameDetector {
  public:
   virtual ~FrameDetector() = default;
@@ -41,15 +43,15 @@ class FrameDetector {
 
 class DetectorTap {
  public:
-  // Borrows the detector.
+  // Borrows the detector: it must outlive this object.
   explicit DetectorTap(FrameDetector& detector) : detector_(detector) {}
 
   // Real-time thread: whether the frame of this record can be handed over.
   [[nodiscard]] static bool takes(const OrientationRecord& record) {
     return record.mode == RecordMode::kOe && record.frame && record.time_s && record.orientation;
   }
-  // Real-time thread. Returns the slot of the picture that this one replaces; kNoImageSlot if it
-  // replaces none.
+  // Real-time thread. record: takes() must be true for it, which is not checked again. Returns the
+  // slot of the picture that this picture replaces; kNoImageSlot if it replaces none.
   [[nodiscard]] ImageSlot put(const OrientationRecord& record, const ImageView& image,
                               ImageSlot slot);
   // Real-time thread: no frame will follow.
@@ -59,7 +61,8 @@ class DetectorTap {
   // looked at.
   void run();
 
-  // Capture thread: pops one slot whose picture is no longer in use.
+  // Capture thread: pops one slot whose picture is no longer in use. False: there is none now. The
+  // queue has room for every slot.
   bool pop_returned(ImageSlot& slot) { return returned_.pop(slot); }
 
   // Any thread: the number of pictures that were replaced.

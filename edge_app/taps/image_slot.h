@@ -1,6 +1,6 @@
 #pragma once
-// ImageSlot: the place where the capture thread keeps an image that others still look at. The last
-// one to use the image returns the slot.
+// ImageSlot: the place where the capture thread keeps an image that other threads still use. The
+// last thread to use the image returns the slot. 0 to kImageSlots - 1, or kNoImageSlot.
 
 #include <cstdint>
 

@@ -7,7 +7,7 @@
 //                                                                    +--> capture thread
 //
 // Images are made on request only, and at most five times a second for all askers together: a
-// request within an interval of the newest image is answered with that one. For the real-time
+// request within an interval of the newest image is answered with that image. For the real-time
 // thread a request is one atomic flag, and the hand-over is one push of a fixed-size message and
 // one post. The image is lent with its slot, not copied.
 
@@ -42,7 +42,7 @@ struct LiveImage {
   std::int64_t frame = 0;
   int width = 0;  // px, of the full image
   int height = 0;
-  std::string jpeg;  // at most ImageTap::kMaxWidth wide; empty: encoding failed
+  std::string jpeg;  // at most ImageTap::kMaxWidth px wide; empty: encoding failed
   FrameLandmarks landmarks;
 };
 
@@ -57,8 +57,8 @@ class ImageTap {
   // Any thread but the real-time one. Returns the newest image if it is no older than the interval,
   // else waits for the next one. Null if none came within `patience`, or close() was called.
   [[nodiscard]] std::shared_ptr<const LiveImage> ask(std::chrono::milliseconds patience);
-  // Any thread but the real-time one. One of the last kKept images; null if the frame is not among
-  // them.
+  // Any thread but the real-time one. The image of this frame, if it is one of the last kKept; else
+  // null.
   [[nodiscard]] std::shared_ptr<const LiveImage> of_frame(std::int64_t frame) const;
 
   // Any thread but the real-time one. From now on nobody waits: all requests are answered with

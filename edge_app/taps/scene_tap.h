@@ -1,14 +1,14 @@
 #pragma once
-// SceneTap: now and then lends a live picture to the localizer, which finds where it looks by the
-// scene map. A picture is wanted:
+// SceneTap: now and then lends a live picture to the localizer, which finds the camera's
+// orientation by the scene map. A picture is wanted:
 // 1. at the start, and after a reconnection of the video;
 // 2. when OE mode has lost its landmarks, or found some, since the last picture;
 // 3. without telemetry, while frames have no orientation;
-// 4. when the last one was not found, or a second one has to confirm it;
+// 4. when the last picture was not found, or a second one has to confirm it;
 // 5. else interval_s after the end of the last search.
 // In cases 1 to 4 least_pause_s lie between the end of a search and the next picture. After each
-// picture that is not found the pause doubles, five times at most; it is never longer than
-// interval_s. For a frame without orientation it stays least_pause_s.
+// picture that is not found the pause doubles, five times at most; the pause is never longer than
+// interval_s. While frames have no orientation the pause stays least_pause_s.
 //
 //   real-time thread --LocalizableFrame--> localization thread --ToldBase--> real-time thread
 //                                                | ImageSlot
@@ -34,8 +34,9 @@ namespace alidade {
 // A frame on its way to the localization thread.
 struct LocalizableFrame {
   OrientationRecord record;  // with time; without orientation only if there is no telemetry
-  std::array<double, 3> angular_velocity_rad_s{};  // camera frame; set if there is no orientation
-  ImageView image;                                 // lent with its slot
+  // Camera frame; set if the record has no orientation.
+  std::array<double, 3> angular_velocity_rad_s{};
+  ImageView image;  // lent with its slot
   ImageSlot slot = kNoImageSlot;
 };
 static_assert(std::is_trivially_copyable_v<LocalizableFrame>);
@@ -58,7 +59,7 @@ class SceneLocator {
 
 struct SceneTapOptions {
   double interval_s = 10;    // s, > 0: of case 5
-  double least_pause_s = 1;  // s, > 0: of the others
+  double least_pause_s = 1;  // s, > 0: of cases 1 to 4
 };
 
 class SceneTap {
@@ -69,7 +70,7 @@ class SceneTap {
   // Real-time thread, for each frame: whether its image is wanted. began_anew: the first frame of a
   // connection.
   [[nodiscard]] bool wants(double now_s, RecordMode mode, bool began_anew);
-  // Real-time thread, after wants(). False: not taken.
+  // Real-time thread, after wants(). False: not taken; the slot stays the caller's.
   bool push(const LocalizableFrame& frame);
   bool pop(ToldBase& told) { return told_.pop(told); }
   // Real-time thread: no frame will follow.

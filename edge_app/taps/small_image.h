@@ -1,7 +1,7 @@
 #pragma once
 // small_jpeg(): shrinks an image for a status page, as a grey JPEG. Each small pixel is the mean of
-// factor x factor pixels, factor = ceil(width / max_width). What is left over at the right and at
-// the bottom is cut off. Allocates; about 1 ms for 1920x1080.
+// factor x factor pixels, factor = ceil(width / max_width). Columns at the right and rows at the
+// bottom that do not fill a small pixel are cut off. Allocates; about 1 ms for 1920x1080.
 
 #include <string>
 

@@ -71,7 +71,7 @@ class BuiltInDetectors : public FrameDetector {
   [[nodiscard]] bool find_by_network(const ImageView& image);
   [[nodiscard]] bool find_people(const ImageView& image, const FrameOrientation& orientation);
   [[nodiscard]] bool find_motion(const ImageView& image, const FrameOrientation& orientation);
-  // Adds those boxes that lie on nothing found before, after finish(&box).
+  // Adds the boxes whose middle lies in no box found before, each after finish(&box).
   template <typename Finish>
   void take(const std::vector<DetectionBox>& found, Finish&& finish);
   void count(DetectorKind kind, bool judged, std::size_t boxes);

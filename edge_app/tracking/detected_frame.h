@@ -33,7 +33,7 @@ struct DetectedFrame {
 // What became of a frame.
 enum class DetectionStatus {
   kTaken,
-  kTakenLate,  // put in its place; later frames are processed again
+  kTakenLate,  // put in order of time; later frames are processed again
   kMalformed,  // cannot be read
   kTooManyBoxes,
   kUnknownFrame,   // not among the frames kept

@@ -18,8 +18,8 @@ struct DetectorKindRow {
   bool needs_ground;  // requires tracking.plane
 };
 
-// They look at a picture from the last row to the first: what a later row has found is left out in
-// those before it.
+// The detectors look at a picture from the last row to the first. What the detector of a later row
+// has found is left out of the findings of earlier rows.
 inline constexpr std::array<DetectorKindRow, kDetectorKindCount> kDetectorKinds = {
     {{DetectorKind::kMotion, "motion", false},
      {DetectorKind::kPeople, "people", true},

@@ -26,7 +26,7 @@ class TargetFeed {
   TargetFeed(const TargetFeed&) = delete;
   TargetFeed& operator=(const TargetFeed&) = delete;
 
-  // Call before start(). on_news is called on the feed's thread after each frame that was taken.
+  // To be called before start(). on_news runs on the feed's thread after each frame that was taken.
   void add_on_news(OnNews on_news) { on_news_.push_back(std::move(on_news)); }
   [[nodiscard]] bool start();  // false: no thread could be started
   void stop();                 // frames that still wait are dropped
@@ -37,7 +37,7 @@ class TargetFeed {
   void count_refused(DetectionStatus status);
 
   [[nodiscard]] const TargetOptions& options() const { return options_; }
-  // The state of one moment.
+  // All of one moment.
   struct Snapshot {
     std::shared_ptr<const TargetsState> newest;  // null before the first frame taken
     TargetCounters counters;

@@ -9,8 +9,8 @@ namespace alidade {
 struct TargetOptions {
   TargetTrackerOptions tracker;
   double detection_sigma_px = 2;  // of each coordinate of a detection's place
-  double false_alarms = 0.1;      // per frame, anywhere in the picture
-  double least_score = 0;         // boxes with a lower score are left out
+  double false_alarms = 0.1;      // expected number per frame, in the whole picture
+  double least_score = 0;         // 0 to 1; boxes with a lower score are left out
 
   [[nodiscard]] bool validate(const char** error = nullptr) const;
 };

@@ -15,14 +15,14 @@ namespace alidade {
 
 struct TargetCounters {
   std::array<std::int64_t, kDetectionStatusCount> frames{};  // by outcome
-  // Boxes of frames that were taken. Those that cannot be used:
+  // The counters below count boxes of frames that were taken. Boxes that cannot be used:
   std::array<std::int64_t, kBoxFaultCount> boxes_unusable{};
   std::int64_t boxes_taken = 0;
-  // Those that do not show a target's place:
+  // Boxes that do not show a target's place: those below least_score,
   std::int64_t boxes_below_score = 0;
-  // By the picture's lower edge: on a plane, their foot is not seen.
+  // those cut off by the picture's lower edge (on a plane, as their foot is not seen),
   std::int64_t boxes_cut_off = 0;
-  // Above the horizon or too near to it, or where the lens has no direction.
+  // and those above the horizon, too near to it, or where the lens has no direction.
   std::int64_t boxes_without_place = 0;
   std::int64_t births_refused = 0;  // because there were tracker.max_targets
 
@@ -48,8 +48,8 @@ struct TargetCounters {
 // The appearance of a target when it was last seen.
 struct TargetLook {
   std::string name;   // class of most of its recent detections
-  double weight = 0;  // of that class against the others
-  double score = 0;   // of the last detection
+  double weight = 0;  // of class `name` against the others
+  double score = 0;   // 0 to 1, of the last detection
   double width = 0;   // px, of its box
   double height = 0;  // px
   double scale = 0;   // px per metre at its place, or px per radian
@@ -66,7 +66,7 @@ struct TargetsState {
   TargetSpace space = TargetSpace::kPlane;
   double acceleration_density = 0;
   std::shared_ptr<const PlaneEstimate> plane;  // null on the sphere
-  double time_s = 0;                   // s, of the targets: middle row of the record's frame
+  double time_s = 0;                   // s, host clock, of the middle row of the record's frame
   OrientationRecord record;            // of the newest frame taken
   std::vector<TrackedTarget> targets;  // sorted by identity
   TargetCounters counters;

@@ -25,7 +25,7 @@ using TargetKeys = std::array<const char*, kSize>;
   return target.name;
 }
 
-// On the plane, where there is always a state. m, and m/s.
+// X and Y, m, and their rates, m/s. Only for targets on the plane, which always have a state.
 [[nodiscard]] inline Vector2<double> place_of(const TargetReport& target) {
   return target.state->head<2>();
 }

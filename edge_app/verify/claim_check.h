@@ -1,11 +1,11 @@
 #pragma once
-// Whether directions of the same place, by two frames, differ by what their sigmas claim.
-//   y_p = mean of a pair's residuals,  C_p = its covariance by both frames and the calibration
+// Whether directions of one place, by two frames, differ by as much as their sigmas claim.
+//   y_p = mean of the residuals of pair p,  C_p = its covariance by both frames and the calibration
 //   ratio^2 = mean of y_p^T C_p^-1 y_p / 2
-// What both frames share cancels: errors of the calibration enter by their difference. Errors of
-// the two frames count as independent, which is too much for those of a common map: then the ratio
-// is small, never large. Pairs that share frames, and all that share the calibration, are
-// correlated; with R the correlations of all y_p, whitened pair by pair,
+// An error of the calibration counts by the difference of its effects on the two frames. Errors of
+// the two frames count as independent. Errors of a common map are not, which makes the ratio too
+// small, never too large. Pairs are correlated if they share frames, and by the calibration; with R
+// the correlations of all y_p, whitened pair by pair,
 //   freedom = (trace R)^2 / |R|^2       (Satterthwaite),   freedom * ratio^2 ~ chi-square
 // px, rad. Pure; allocates.
 
@@ -17,41 +17,43 @@
 
 namespace alidade {
 
-// One pair's mean, for statistics and plots.
+// One pair's mean over its places, for statistics and plots.
 struct PairMean {
-  std::size_t first = 0;
-  std::size_t second = 0;
-  Vector2<double> residual = Vector2<double>::Zero();  // px
-  Matrix2<double> noise = Matrix2<double>::Zero();     // px^2, of the places
-  Matrix<double, 2, 4> J_first = Matrix<double, 2, 4>::Zero();
-  Matrix<double, 2, 4> J_second = Matrix<double, 2, 4>::Zero();
-  Sensitivity<2> P = Sensitivity<2>::Zero();
+  std::size_t first = 0;                                         // index of the frame
+  std::size_t second = 0;                                        // likewise
+  Vector2<double> residual = Vector2<double>::Zero();            // px
+  Matrix2<double> noise = Matrix2<double>::Zero();               // px^2, of the places
+  Matrix<double, 2, 4> J_first = Matrix<double, 2, 4>::Zero();   // as in pair_rows.h
+  Matrix<double, 2, 4> J_second = Matrix<double, 2, 4>::Zero();  // likewise
+  Sensitivity<2> P = Sensitivity<2>::Zero();                     // P_first + P_second
 };
 
 struct ClaimResult {
   int pairs = 0;
   int frames = 0;
-  double freedom = 0;  // independent numbers behind the ratio; two a pair at most
-  double rms_px = 0;   // of the lengths of y_p
-  double rms_deg = 0;
-  double claimed_px = 0;  // what the covariances make of it
+  double freedom = 0;     // independent numbers behind the ratio; two a pair at most
+  double rms_px = 0;      // of the lengths of y_p
+  double rms_deg = 0;     // the same as an angle
+  double claimed_px = 0;  // rms_px as the covariances claim it
   double ratio = 0;
   double low = 0, high = 0;  // 95 % interval of the ratio, if errors are as alike as claimed
-  double log_chance = 0;     // of a ratio at least as large, if sigmas hold
+  double log_chance = 0;     // natural; of a ratio at least as large, if the sigmas hold
 };
 
+// Means, weighted by the places' noise. noise_factor: by which the places' variances are too small.
 [[nodiscard]] std::vector<PairMean> pair_means(const std::vector<PairRows>& pairs,
                                                double noise_factor);
 
-// motion: covariance of each frame's (pan, tilt, pan rate, tilt rate). motion_inflation: >= 1, how
-// many neighbouring frames share an error and count as one.
+// motion: covariance of each frame's (pan, tilt, pan rate, tilt rate), rad, rad/s.
+// motion_inflation: >= 1, how many neighbouring frames share an error and count as one.
+// focal_length: px.
 [[nodiscard]] ClaimResult check_claims(const std::vector<PairMean>& pairs,
                                        const std::vector<Matrix4<double>>& motion,
                                        const ParameterCovariance<double>& parameters,
                                        double motion_inflation, double focal_length);
 
-// Value that chi-square with `freedom` exceeds with the probability of a normal value beyond z
-// (Wilson and Hilferty).
+// The value that chi-square with `freedom` degrees of freedom exceeds as probably as a standard
+// normal number exceeds z (Wilson and Hilferty).
 [[nodiscard]] double chi_square_at(double z, double freedom);
 
 }  // namespace alidade

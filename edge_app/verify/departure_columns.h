@@ -1,7 +1,7 @@
 #pragma once
-// By what each departure would shift frames and parameters: the columns that model_check.h tests.
-// A parameter's column is its own; those of gears, play and drifts are told frame by frame, rad or
-// relative, for an amplitude of 1. Allocates.
+// How each departure would shift frames and parameters: the columns that model_check.h tests. The
+// departure of a parameter shifts the parameter. A gear, a play or a drift shifts an angle (rad) or
+// log f of each frame, given for an amplitude of 1. Allocates.
 
 #include <vector>
 
@@ -10,21 +10,21 @@
 
 namespace alidade {
 
-// A column that shifts a frame's angles or parameter by a known number.
+// A column that shifts one quantity of each frame by a known number.
 struct FrameColumn {
   enum class What { kPan, kTilt, kFocalLength } what = What::kPan;
-  std::vector<double> of_frame;  // for an amplitude of 1
+  std::vector<double> of_frame;  // by frame: the shift for an amplitude of 1
 };
 
 struct DepartureColumns {
   Departure departure;
-  std::vector<int> parameters;  // of Parameter; or
-  std::vector<FrameColumn> columns;
-  std::vector<double> at;
+  std::vector<int> parameters;       // indices of Parameter; or else
+  std::vector<FrameColumn> columns;  // shifts of frames
+  std::vector<double> at;            // of a curve: its knots, rad or s, one for each column
   [[nodiscard]] int count() const { return static_cast<int>(parameters.size() + columns.size()); }
 };
 
-// In the order of Departure. A curve has none where the frames do not range over its knots.
+// In the order of Departure. A curve has no columns if the frames do not range over its knots.
 [[nodiscard]] std::vector<DepartureColumns> all_departures(const std::vector<SeenFrame>& frames);
 
 }  // namespace alidade

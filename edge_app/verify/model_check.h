@@ -1,13 +1,14 @@
 #pragma once
-// Whether pictures and telemetry agree with the calibration, and if not, with what else they would.
-// All pairs of pictures together, with the orientations by all of telemetry's samples
-// (pair_rows.h):
+// Whether pictures and telemetry agree with the calibration and, if not, which departures from it
+// would make them agree. All pairs of pictures together, with the orientations by all of
+// telemetry's samples (pair_rows.h):
 //   r = X x + noise     x: errors of frames and parameters, each with the claimed covariance
-// A departure is columns Z of unknown size a. With C the covariance of r that is claimed
-//   s = Z^T C^-1 r,   V = Z^T C^-1 Z,   s^T V^-1 s ~ chi-square if there is none    (score test)
-// Noise of the pictures is measured: by the residuals, and by how the pairs' parts of s scatter.
-// Departures are taken one after the other, the least probable first, until nothing is improbable;
-// of these, those stay that explain most for their number.
+// A departure adds Z a to r, with known columns Z and unknown size a. With C the claimed covariance
+// of r
+//   s = Z^T C^-1 r,   V = Z^T C^-1 Z,   s^T V^-1 s ~ chi-square if a is 0           (score test)
+// The noise of the pictures is measured: by the residuals, and by the scatter of the pairs' parts
+// of s. Departures are found one after the other, the least probable first, until none is
+// improbable; of these the ones are kept that explain most for their number.
 // rad, s, px. Allocates.
 
 #include <array>
@@ -29,43 +30,43 @@ enum class Departure : int {
   kPanAxis,
   kTiltAxis,
   kClockOffset,
-  kPanGear,  // telemetry's pan is off by a function of the angle
-  kTiltGear,
+  kPanGear,   // telemetry's pan is off by a function of the angle
+  kTiltGear,  // likewise
   kPanPlay,
   kTiltPlay,
   kFocalDrift,  // f changes during the recording
-  kPanDrift,    // telemetry's zero does
-  kTiltDrift,
+  kPanDrift,    // telemetry's zero of pan changes during the recording
+  kTiltDrift,   // likewise
   kCount
 };
 inline constexpr int kDepartureCount = static_cast<int>(Departure::kCount);
 
 struct DepartureTest {
   Departure departure = Departure::kFocalLength;
-  int freedom = 0;        // numbers of it that the recording shows; 0: none
-  double chi_square = 0;  // for `freedom`
-  double log_chance = 0;  // of so much, if there is no such departure
-  double scatter = 1;     // of the variance, by what a pair's places share; divides chi_square
-  // Size by this recording alone, and its sigma: px, 1, rad or s; of curves at their knots, in
-  // order of `at`. Truth minus calibration; telemetry minus truth for gears and drifts of its zero.
+  int freedom = 0;        // how many of its numbers the recording shows; 0: none
+  double chi_square = 0;  // with `freedom` degrees of freedom
+  double log_chance = 0;  // natural; of so large a chi-square without this departure
+  // By which the variance grows, as the places of a pair share errors; chi_square is divided by it.
+  double scatter = 1;
+  // Size by this recording alone, and its sigma: px, 1, rad or s; of a curve at its knots, in the
+  // order of `at`. Truth minus calibration; of gears and drifts of the zero: telemetry minus truth.
   std::vector<double> size, sigma;
   std::vector<double> at;    // rad or s; empty: not a curve
-  double claimed_sigma = 0;  // of a parameter, by the calibration
+  double claimed_sigma = 0;  // of a parameter, by the calibration; 0: not a parameter
 };
 
-// Tests of all departures; and of those that were found, in the order of what they explain, each
-// with the others left free.
 struct ModelCheckResult {
-  std::vector<DepartureTest> tests;
+  std::vector<DepartureTest> tests;  // of all departures, each by itself
+  // Of the departures that were found, each with the others free; the one that explains most first.
   std::vector<DepartureTest> found;
-  double noise_ratio = 1;  // of residuals and the noise that alignment states; RMS
-  int places = 0;
-  int pairs = 0;
+  double noise_ratio = 1;  // residuals over the noise that alignment states; RMS
+  int places = 0;          // that were compared
+  int pairs = 0;           // of pictures
 };
 
-// motion_inflation: >= 1, of the variances of the frames' errors, as neighbouring frames share
-// telemetry samples. log_limit: of the chance, below which a departure is found. calibration: of
-// these frames' lens, with its covariance.
+// motion_inflation: >= 1, factor of the variances of the frames' errors, as neighbouring frames
+// share telemetry samples. log_limit: a departure with a smaller log_chance is found. calibration:
+// of these frames' lens, with its covariance.
 [[nodiscard]] ModelCheckResult check_model(const std::vector<SeenFrame>& frames,
                                            const std::vector<PairRows>& pairs,
                                            const Calibration& calibration,

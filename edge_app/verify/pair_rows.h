@@ -1,10 +1,10 @@
 #pragma once
-// What a place that two pictures show says about calibration and orientations, linearised:
-//   r = seen - expected,   expected = pixel of the second frame that sees what `first` sees
+// What a place in two pictures says about calibration and orientations, linearised:
+//   r = seen - expected,   expected = the second picture's pixel for the place seen in the first
 //   r = J_first e_first + J_second e_second + (P_first + P_second) e_theta + noise
-// e: truth minus estimate, of a frame's (pan, tilt, pan rate, tilt rate) at row 0 and of the
-// parameters (Parameter). P contains what the parameters change of the frame's motion. px, rad, s.
-// Pure; allocates.
+// e: truth minus estimate; e_first and e_second of a frame's (pan, tilt, pan rate, tilt rate) at
+// row 0, e_theta of the parameters (Parameter). P includes the parameters' effect by the frame's
+// motion. px, rad, s. Pure; allocates.
 
 #include <vector>
 
@@ -13,6 +13,7 @@
 
 namespace alidade {
 
+// See SeenFrame.
 enum class OrientationFrom { kTelemetry, kAllSamples, kLandmarks };
 
 struct PlaceRow {
@@ -43,7 +44,8 @@ struct PairRows {
   return frame.by_landmarks;
 }
 
-// Pairs of which a frame has no such orientation are left out.
+// from: which orientation of each frame is used. A pair is left out if one of its frames has no
+// such orientation.
 [[nodiscard]] std::vector<PairRows> pair_rows(const std::vector<SeenFrame>& frames,
                                               const std::vector<PlacePair>& pairs,
                                               OrientationFrom from);

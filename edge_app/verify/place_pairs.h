@@ -1,9 +1,9 @@
 #pragma once
-// Places that two pictures of a recording both show. Corners of the first picture are looked for in
-// the second, where the orientations of both say they are (image room: FAST corners, patch
-// alignment). They are chosen anew, and are not the landmarks that OE mode used. Pictures lie at
-// least kLeastGap_s apart, so that neighbours do not count as returns. Pixels as CONVENTIONS.md has
-// them. Pure; allocates.
+// Places that two pictures of a recording both show. Corners of the first picture (FAST) are
+// searched for in the second by patch alignment, around the places that the orientations of both
+// give. The corners are chosen anew: they are not the landmarks that OE mode used. The pictures lie
+// at least kLeastGap_s apart, so that neighbours do not count as returns. Pixels as in
+// CONVENTIONS.md. Pure; allocates.
 
 #include <vector>
 
@@ -26,8 +26,8 @@ struct PlacePair {
   std::vector<PlaceMatch> places;
 };
 
-// Each frame has a few partners, at all distances in time. A pair with fewer than six places that
-// agree is left out.
+// frames: by time. Each frame has a few partners, at all distances in time. A pair with fewer than
+// six places that agree is left out.
 [[nodiscard]] std::vector<PlacePair> match_places(const std::vector<SeenFrame>& frames);
 
 }  // namespace alidade

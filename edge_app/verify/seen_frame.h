@@ -1,7 +1,7 @@
 #pragma once
-// SeenFrame: a frame of the recording with its picture and what both modes say of its orientation;
-// PT mode also with the samples after the frame, which know more than a live step does.
-// FrameCollection: those frames of a replay that are compared with each other, evenly over the
+// SeenFrame: a frame of the recording with its image and its orientation by OE mode, by PT mode,
+// and by PT mode with the samples after the frame, which a live step does not have yet.
+// FrameCollection: the frames of a replay that are compared with each other, evenly over the
 // recording, as many as fit into 256 MB. Allocates. One thread.
 
 #include <cstddef>
@@ -19,12 +19,13 @@ namespace alidade {
 
 struct SeenFrame {
   double time_s = 0;                // s, image clock; capture of row 0
-  double time_sigma_s = 0;          // s; may be shared with all other frames
-  FrameOrientation by_telemetry;    // by the samples that had come when the frame came
-  FrameOrientation by_all_samples;  // by those after it, too
-  FrameOrientation by_landmarks;    // mode kNone: landmarks did not hold
-  PanTilt<double> heading{0, 0};    // -1 or 1: the way each axis turned last; 0: not known
+  double time_sigma_s = 0;          // of time_s; the error may be common to all frames
+  FrameOrientation by_telemetry;    // PT mode, by the samples that had come when the frame came
+  FrameOrientation by_all_samples;  // PT mode, by the samples after the frame, too
+  FrameOrientation by_landmarks;    // OE mode; mode kNone: landmarks did not hold
+  PanTilt<double> heading{0, 0};    // sign of each axis's last motion, -1 or 1; 0: not known
   std::vector<std::uint8_t> luma;   // row by row, without gaps
+  // Lent with this object.
   [[nodiscard]] ImageView image() const {
     const Camera<double>& camera = by_telemetry.calibration.camera;
     return {luma.data(), camera.width, camera.height, camera.width};
@@ -33,11 +34,12 @@ struct SeenFrame {
 
 class FrameCollection {
  public:
-  // frames: of the recording. angle_sigma_rad: noise of a measured angle; what it can make is no
-  // movement.
+  // frames: their number in the recording. width, height: px. angle_sigma_rad: noise of a measured
+  // angle; a change of this size is no movement.
   FrameCollection(std::size_t frames, int width, int height, double angle_sigma_rad);
 
-  // The next frame's records. image: not valid() if there is none.
+  // The next frame's records, for every frame in order. image: copied; not valid() if there is
+  // none.
   void add(const OrientationRecord& by_landmarks, const OrientationRecord& by_telemetry,
            const OrientationRecord& by_all_samples, const ImageView& image);
 

@@ -1,11 +1,11 @@
 #pragma once
-// Verification: how good a calibration is on a recording, with nothing to compare with but the
-// recording itself. Two kinds of comparison, each with a limit that follows from its distribution:
+// Verification: how good a calibration is on a recording, judged by the recording alone. Two kinds
+// of comparison, each with a limit that follows from its distribution:
 //   claims    directions of places that were seen twice, by kind of return and by mode, against the
 //             sigmas of the records (claim_check.h)
 //   model     telemetry and pictures against the calibration, by departure (model_check.h)
-// Of all comparisons together, one in a hundred calibrations with true sigmas is contradicted at
-// most (Bonferroni). Pure; allocates.
+// If all sigmas are true, the comparisons together contradict at most one calibration in a hundred
+// (Bonferroni). Pure; allocates.
 
 #include <optional>
 #include <string>
@@ -17,53 +17,62 @@
 namespace alidade {
 
 enum class Verdict {
-  kHolds,  // no comparison contradicts the sigmas
-  kContradicted,
-  kNotJudged  // too few returns
+  kHolds,         // no comparison contradicts the sigmas
+  kContradicted,  // a comparison does, beyond chance
+  // Fewer than kLeastPairs pairs or kLeastFreedom independent numbers; or, of a departure, a test
+  // that would show only twenty times the claimed sigma.
+  kNotJudged
 };
 
 // How the two pictures of a pair differ. A pair may differ in several ways.
-enum class ReturnKind : int { kAll, kOtherSide, kOtherSpeed, kOtherPlace, kOtherZoom, kCount };
+enum class ReturnKind : int {
+  kAll,         // in any way
+  kOtherSide,   // pan or tilt came from the other side
+  kOtherSpeed,  // by more than half of the largest difference of speeds among all pairs
+  kOtherPlace,  // the places moved by more than 0.3 of the picture's width or height
+  kOtherZoom,   // by more than 2 % in f
+  kCount
+};
 
 struct ClaimComparison {
   ReturnKind kind = ReturnKind::kAll;
-  OrientationFrom from = OrientationFrom::kLandmarks;
+  OrientationFrom from = OrientationFrom::kLandmarks;  // or kTelemetry
   Verdict verdict = Verdict::kNotJudged;
   ClaimResult result;
-  std::string sentence;
+  std::string sentence;  // the verdict in words
 };
 
 struct ModelComparison {
   Verdict verdict = Verdict::kNotJudged;
   DepartureTest test;
-  std::string sentence;
+  std::string sentence;  // the verdict in words
 };
 
 struct VerifyInput {
-  std::string recording;
-  std::string calibration;  // its name
-  const std::vector<SeenFrame>& frames;
-  TelemetryError telemetry_error;
-  double telemetry_sigma_rad = 0;  // white noise of a sample, as was assumed
-  double telemetry_rate_hz = 0;
+  std::string recording;                 // its name
+  std::string calibration;               // its name
+  const std::vector<SeenFrame>& frames;  // by time; borrowed for the call of verify()
+  TelemetryError telemetry_error;        // of the calibration
+  double telemetry_sigma_rad = 0;        // white noise of a sample, as was assumed; 0: not known
+  double telemetry_rate_hz = 0;          // samples per second
 };
 
 struct Verification {
   Verdict verdict = Verdict::kNotJudged;
-  std::string sentence;             // the verdict in words
-  std::vector<std::string> advice;  // what motion would serve
-  int pairs = 0;
-  int places = 0;
-  double noise_ratio = 1;   // of the pictures, see ModelCheckResult
-  double chance_limit = 0;  // of each comparison
-  std::vector<ClaimComparison> claims;
-  std::vector<ModelComparison> model;
-  std::vector<DepartureTest> found;  // in the order of what they explain
-  // For plots.
+  std::string sentence;                 // the verdict in words
+  std::vector<std::string> advice;      // what motion would serve
+  int pairs = 0;                        // of pictures
+  int places = 0;                       // see ModelCheckResult
+  double noise_ratio = 1;               // see ModelCheckResult
+  double chance_limit = 0;              // a comparison less probable than this contradicts; 0 to 1
+  std::vector<ClaimComparison> claims;  // each kind for landmarks, then for telemetry; may be empty
+  std::vector<ModelComparison> model;   // each departure; empty as claims: there are no pairs
+  std::vector<DepartureTest> found;     // see ModelCheckResult; empty if pairs < kLeastPairs
+  // For plots: one entry for each pair that could be compared.
   std::vector<PairRows> by_landmarks, by_telemetry, by_all_samples;
 };
 
-// A comparison with fewer independent numbers is not judged.
+// A comparison with fewer independent numbers, or fewer pairs, is not judged.
 inline constexpr double kLeastFreedom = 12;
 inline constexpr int kLeastPairs = 20;
 

@@ -1,6 +1,6 @@
 #pragma once
-// A verification in words: names, sizes with their units, a sentence for each comparison and for the
-// whole. Pure; allocates.
+// A verification in words: names, sizes with their units, a sentence for each comparison and for
+// the whole. Pure; allocates.
 
 #include <string>
 
@@ -11,8 +11,9 @@ namespace alidade {
 [[nodiscard]] const char* to_string(Verdict verdict);
 [[nodiscard]] const char* name_of(ReturnKind kind);
 
-// What a departure is called, and its size in words: "clock offset: 3.02 +- 0.05 ms".
+// "clock offset"
 [[nodiscard]] const char* name_of(Departure departure);
+// The size of a departure, with its sigma and unit: "off by 3.02 +- 0.05 ms".
 [[nodiscard]] std::string size_of(const DepartureTest& test);
 
 [[nodiscard]] std::string sentence_of(const ClaimComparison& comparison);

@@ -2,13 +2,14 @@
 // AxisPairing: makes samples from readings of single axes: pan, tilt, pan, tilt, ...
 //
 // Pan and tilt of a sample belong to the moment of the tilt reading. The pan is interpolated
-// between the readings before and after it. Let t0, t2 be the middles and h0, h2 the half widths of
-// the pan readings' intervals, t1, h1 those of the tilt's, and w = (t1 - t0) / (t2 - t0):
+// between the readings before and after the tilt. Let t0, t2 be the middles and h0, h2 the half
+// widths of the pan readings' intervals, t1 and h1 the same of the tilt reading's interval, and
+// w = (t1 - t0) / (t2 - t0):
 //   pan = pan0 + w wrap(pan2 - pan0), interval t1 -+ max(h1, (1 - w) h0 + w h2).
-// Without it pan and tilt would be half a cycle apart: 15 ms at 34 Hz, which no clock offset can
-// repair. The price: a sample comes half a cycle later. If both axes repeat their previous reading
-// (head at rest, or no new measurement in the device), the sample repeats too. No side effects, no
-// allocation; radians and seconds.
+// Without interpolation pan and tilt would be half a cycle apart: 15 ms at 34 Hz, which no clock
+// offset can repair. The price: a sample comes half a cycle later. If both axes repeat their
+// previous reading (head at rest, or no new measurement in the device), the sample repeats too. No
+// side effects, no allocation; radians, and seconds of the host's CLOCK_MONOTONIC.
 
 #include <optional>
 
@@ -29,10 +30,11 @@ struct PairedReading {
 
 class AxisPairing {
  public:
-  // Call it at a gap: earlier readings are not interpolated with later ones.
+  // To be called at a gap. Readings before it are not interpolated with readings after it.
   void reset();
 
-  // Readings come in order of time. Returns a sample for the pan that follows a tilt.
+  // Readings must come in order of time. A pan that follows a tilt completes that tilt's sample,
+  // which is returned; nullopt otherwise.
   std::optional<PairedReading> add_pan(const AxisReading& pan);
   void add_tilt(const AxisReading& tilt);
 

@@ -4,8 +4,8 @@
 // Devices report the time of the measurement, the time of the answer, whole seconds, a constant, or
 // nothing. Times are useful if they never go backwards, are finer than whole seconds, and advance
 // at the rate of the host's clock (within kSlack_s). The verdict comes with the second change of
-// the device time, or is kUseless if that takes too long; it is then final. No side effects; one
-// thread.
+// the device time, or is kUseless if that change takes too long. A verdict other than kOpen is
+// final. No side effects; one thread.
 
 #include <cmath>
 #include <optional>
@@ -16,7 +16,8 @@ class DeviceClockTrial {
  public:
   enum class Verdict { kOpen, kUseful, kUseless };
 
-  // device_time_s: from the answer received at host_time_s. nullopt gives kUseless.
+  // device_time_s: s, device clock, from the answer received at host_time_s (s, host
+  // CLOCK_MONOTONIC). nullopt gives kUseless.
   Verdict add(std::optional<double> device_time_s, double host_time_s) {
     if (verdict_ != Verdict::kOpen) {
       return verdict_;

@@ -1,9 +1,9 @@
 #pragma once
 // The heads that QuerySource can poll, one row each. Sources, configuration, tests, fuzz targets
 // and the soak test take their lists from here. The simulated heads have a list of their own,
-// kHeadModels; a test compares it with this one. A switch over HeadType or a visit of HeadOptions
-// that lacks a head does not compile, and CMake names a missing file. How to add a head: README.md
-// of this folder.
+// kHeadModels; a test compares the two lists. A switch over HeadType or a visit of HeadOptions that
+// lacks a head does not compile, and CMake names a missing file. How to add a head: README.md of
+// this folder.
 
 #include <array>
 #include <cstddef>

@@ -2,11 +2,11 @@
 // open_http_polling(): a PanTiltSource that polls a device over one persistent HTTP connection
 // (libcurl). An HttpConversation, which does no I/O, makes the requests and interprets the answers.
 // Polls lie on a fixed grid of 1/rate_hz; a late answer skips grid points and does not shift the
-// grid. kDisconnected: unreachable, timed out, or an error that the conversation reports as such;
-// the next attempt follows after a growing pause. kFailed: unusable URL, or a permanent error of
-// the conversation such as a refused login, but only before the first sample. Later a rebooting
-// device may refuse for a while (kMostRefusalPauses). read() runs the transfer on the calling
-// thread and allocates.
+// grid. kDisconnected: unreachable, timed out, or the conversation reports kDisconnected; the next
+// attempt follows after a growing pause. kFailed: unusable URL; before the first sample also a
+// permanent error of the conversation, such as a refused login. After the first sample such an
+// error is kDisconnected, as a rebooting device may refuse for a while (kMostRefusalPauses). read()
+// runs the transfer on the calling thread and allocates.
 
 #include <memory>
 #include <optional>
@@ -34,9 +34,10 @@ struct HttpAnswer {
   bool offers_digest = false;  // with 401: digest, or basic where permitted (link_rules.h)
   bool only_basic = false;     // with 401: only basic is offered, and it is not permitted
   std::string login_error;     // with 401: one line on what may be wrong
-  // s, host CLOCK_MONOTONIC. The answer was true between just before the request was sent and the
-  // arrival of its first bytes. A server that writes header and body separately may delay the body
-  // by the 40 ms of a delayed acknowledgement: that limits the rate, not this interval.
+  // s, host CLOCK_MONOTONIC. The answer was true at some moment between the sending of the request
+  // and the arrival of the answer's first bytes. A server that writes header and body separately
+  // may delay the body by the 40 ms of a delayed acknowledgement. This delay lowers the rate, but
+  // does not widen the interval.
   double earliest_time_s = 0;
   double latest_time_s = 0;
 };
@@ -69,8 +70,8 @@ class HttpConversation {
 };
 
 // Longest pause between two attempts of a login that was accepted before, in units of
-// HttpDeviceOptions::max_backoff_s. It is long because devices lock a user out after a few wrong
-// logins.
+// HttpDeviceOptions::max_backoff_s. The pause is long because devices lock a user out after a few
+// wrong logins.
 constexpr double kMostRefusalPauses = 12;
 
 // The user's options for any polled device.
@@ -102,8 +103,8 @@ struct HttpPollingPlan {
 
 [[nodiscard]] std::unique_ptr<PanTiltSource> open_http_polling(HttpPollingPlan plan);
 
-// Splits options->url. Takes user and password from it if options have none, and puts the URL
-// without them into options->name. Returns what is wrong, or empty.
+// Splits options->url into *url. Takes user and password from the URL if *options has none, and
+// puts the URL without them into options->name. Returns what is wrong, in one line; empty: nothing.
 [[nodiscard]] std::string take_http_url(Url* url, HttpPollingOptions* options);
 
 }  // namespace alidade

@@ -1,12 +1,12 @@
 #pragma once
 // OnvifLoginWays: the ways to log in at an ONVIF device, their order, and the one that works.
 //
-// A WS-UsernameToken holds the time of its creation. The device compares it with a clock: the one
-// that it reports as UTC; or the true time, if it reports its local time as UTC; or the local time
-// that it reports besides. Other devices want HTTP digest, and offer it. Devices lock a user out
-// after three to five wrong logins. Therefore at most kMostTries ways are tried in one go, and no
-// clock twice. If a login was accepted before, one attempt follows each pause (HttpPollingSource)
-// and each way gets two: the device's clock may have been set.
+// A WS-UsernameToken holds the time of its creation. The device compares this time with a clock:
+// the clock that the device reports as UTC; or the true time, if the device reports its local time
+// as UTC; or the local time that the device reports besides. Other devices want HTTP digest, and
+// offer it. Devices lock a user out after three to five wrong logins. Therefore at most kMostTries
+// ways are tried in one go, and no clock twice. If a login was accepted before, one attempt follows
+// each pause (HttpPollingSource), two for each way: the device's clock may have been set.
 
 #include <optional>
 #include <string>
@@ -21,12 +21,13 @@ class OnvifLoginWays {
   enum class Way { kDeviceClock, kHostClock, kLocalClock, kDigest };
   static constexpr int kMostTries = 3;
 
-  // told: the clock that the device reports; nullopt: none. Both times (s) are those of the
-  // answer.
+  // told: the clock that the device reports; nullopt: none. monotonic_s (CLOCK_MONOTONIC), utc_s
+  // (Unix time): the host's clocks, s, when the answer came.
   void set_clock(const std::optional<OnvifClock>& told, double monotonic_s, double utc_s);
 
   [[nodiscard]] Way way() const { return way_; }
-  // Creation time for a token; not for kDigest. utc_s: of the host.
+  // Creation time for a token, s, Unix time; not for kDigest. monotonic_s, utc_s: the host's clocks
+  // now, s.
   [[nodiscard]] double created_utc_s(double monotonic_s, double utc_s) const;
 
   // The login was refused. True: try another way at once.

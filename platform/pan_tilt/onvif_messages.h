@@ -47,9 +47,9 @@ constexpr OnvifCall kGetConfigurationOptions{kOnvifPtz, "GetConfigurationOptions
 
 struct SoapFault {
   bool not_authorized = false;
-  bool of_a_service = false;  // from the right service: a profile is missing or an argument is
-                              // wrong
-  std::string text;           // "ter:NotAuthorized: Sender not authorized"
+  // The right service answered; a profile is missing or an argument is wrong.
+  bool of_a_service = false;
+  std::string text;  // "ter:NotAuthorized: Sender not authorized"
 };
 
 // nullopt if the body is not a fault.
@@ -58,7 +58,7 @@ struct SoapFault {
 // True if the body is an answer to the call, whatever its content.
 [[nodiscard]] bool is_onvif_answer(std::string_view body, const OnvifCall& call);
 
-// The device's clock, in whole seconds. At least one of the two is given.
+// The device's clock, in whole seconds. At least one member is set.
 struct OnvifClock {
   std::optional<double> utc_s;    // Unix time
   std::optional<double> local_s;  // local date and time, read as if it were UTC
@@ -70,11 +70,11 @@ struct OnvifServices {
   std::string ptz;
   std::string media;
 };
-// Parses the answer to GetCapabilities or GetServices. False: it names no PTZ service.
+// Parses the answer to GetCapabilities or GetServices. False: the answer names no PTZ service.
 [[nodiscard]] bool parse_onvif_services(std::string_view body, OnvifServices* services,
                                         std::string* error);
 
-// Tokens of the first profile that has a PTZ configuration; the last two may be empty.
+// Tokens of the first profile that has a PTZ configuration. configuration and node may be empty.
 struct OnvifProfile {
   std::string token;
   std::string configuration;
@@ -95,8 +95,9 @@ struct OnvifSpaceRange {
   std::optional<OnvifInterval> pan;
   std::optional<OnvifInterval> tilt;
 };
-// Parses the answer to GetNodes or GetConfigurationOptions. node: takes the spaces of this node, or
-// of all nodes if it is empty or missing. False: no range is declared.
+// Parses the answer to GetNodes or GetConfigurationOptions. node: token of the node whose spaces
+// are taken; if it is empty, or the answer lacks the node, all nodes' are. False: no range is
+// declared.
 [[nodiscard]] bool parse_onvif_ranges(std::string_view body, const std::string& node,
                                       std::vector<OnvifSpaceRange>* ranges, std::string* error);
 

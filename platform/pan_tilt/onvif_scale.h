@@ -2,9 +2,10 @@
 // OnvifScale: converts the position values of an ONVIF device to angles.
 //
 // Rules, first match: (1) the scale that the user configured; (2) degrees, if the space says so;
-// (3) the range that the device declares for the space, if it extends beyond -1..1, with the user's
-// angles at its ends, or as degrees if it can be nothing else; (4) -1..1 with the user's angles at
-// its ends, as in the standard. A position outside its scale is an error. No side effects.
+// (3) the range that the device declares for the space, if this range extends beyond -1..1, with
+// the user's angles at its ends, or as degrees if it can be nothing else; (4) -1..1 with the user's
+// angles at its ends, as in the standard. A position outside its scale is an error. No side
+// effects.
 
 #include <optional>
 #include <string>
@@ -43,7 +44,8 @@ class OnvifScale {
   };
   [[nodiscard]] Outcome angles(const OnvifStatus& status, double* pan_rad, double* tilt_rad,
                                std::string* error) const;
-  // How a declared range is used for positions in the space of this one; empty: nothing unusual.
+  // One line on how a declared range is used for positions in the space of `status`. Empty: nothing
+  // unusual.
   [[nodiscard]] std::string note(const OnvifStatus& status) const;
 
  private:

@@ -1,12 +1,12 @@
 #pragma once
 // open_onvif(): polls an ONVIF device for pan, tilt and zoom (PTZ service, GetStatus) over one
 // persistent HTTP connection. Pace, stamps and threads: http_polling_source.h.
-// At each (re)connection it asks for the device's clock (if it has to log in), its services
-// (GetCapabilities, or GetServices; only at the host of `url`: onvif_addresses.h), a profile with
-// PTZ if none is configured, and the range of its positions (GetNodes, or GetConfigurationOptions)
-// if they are not in degrees (onvif_scale.h). Login: onvif_login.h. device_time_s: UtcTime as Unix
-// time, if it is useful (device_clock_trial.h). The first answers are withheld until that is known,
-// so that all samples have it or none.
+// At each (re)connection the source asks for the device's clock (if a login is configured), its
+// services (GetCapabilities, or GetServices; only at the host of `url`: onvif_addresses.h), a
+// profile with PTZ if none is configured, and the range of its positions (GetNodes, or
+// GetConfigurationOptions) if positions are not in degrees (onvif_scale.h). Login: onvif_login.h.
+// device_time_s: UtcTime as Unix time, if it is useful (device_clock_trial.h). The first answers
+// are withheld until this is decided, so that all samples have a device time or none has.
 // kDisconnected: unreachable, timed out, a SOAP fault, HTTP status other than 200, no position in
 // the answer. kFailed: unusable URL; before the first sample also wrong user or password, or a
 // scale without angles. A later refusal may come from a rebooting device or a changed clock.

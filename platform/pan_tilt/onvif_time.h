@@ -21,7 +21,7 @@ struct CivilTime {
 // nullopt: not a valid date and time from 1900 to 9999.
 [[nodiscard]] std::optional<double> unix_time(const CivilTime& civil);
 
-// xs:dateTime to and from Unix time; without a zone it is UTC.
+// xs:dateTime to and from Unix time, s. A time without a zone is UTC. nullopt: not an xs:dateTime.
 [[nodiscard]] std::optional<double> parse_xml_time(std::string_view text);
 [[nodiscard]] std::string xml_time(double utc_s);
 

@@ -25,8 +25,8 @@ class PanTiltSource {
   // One line for the user; valid after kDisconnected and kFailed.
   [[nodiscard]] virtual std::string error() const = 0;
 
-  // Returns the notes since the last call, from the reading thread: how the device deviates from
-  // its protocol, and how that is handled. One line each, reported once in the source's life.
+  // For the reading thread: the notes since the last call. A note is one line: how the device
+  // deviates from its protocol, and how this is handled. Each comes once in the source's life.
   [[nodiscard]] virtual std::vector<std::string> take_notes() { return {}; }
 
   // URL without password, device path or directory.

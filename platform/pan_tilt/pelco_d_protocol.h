@@ -1,5 +1,5 @@
 #pragma once
-// Pelco-D: frames of seven bytes, FF address command1 command2 data1 data2 sum; the sum is that of
+// Pelco-D: frames of seven bytes, FF address command1 command2 data1 data2 sum; `sum` is the sum of
 // bytes 2 to 6 modulo 256. Queries 0x51 pan, 0x53 tilt, 0x55 zoom; answers 0x59, 0x5B, 0x5D with 16
 // bits.
 //   FF 01 00 51 00 00 52 -> FF 01 00 59 11 94 FF = 4500 steps

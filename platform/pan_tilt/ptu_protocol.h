@@ -4,8 +4,8 @@
 //   PR  -> "* 185.1428 seconds arc per position";  TR for tilt;  errors "! text"
 // On connection: FT or FV (terse or verbose), ED (no echo), CI (answers at once), then PR and TR
 // unless the degrees per step are configured, then PP and TP in turn. A verbose answer names its
-// axis, which must be the one asked; a terse one does not, nor does an answer to PR and TR. Fences
-// (query_protocol.h): docs/derivations.md. A lost digit is not noticed.
+// axis, which must be the axis of the query. A terse answer, or one to PR and TR, names no axis.
+// Fences (query_protocol.h): docs/derivations.md. A lost digit is not noticed.
 
 #include <optional>
 

@@ -1,12 +1,12 @@
 #pragma once
 // QueryProtocol: the queries to a pan/tilt head, and how its answers are found in the received
 // bytes. heads.h lists the protocols. No I/O, no clock, no exceptions; QuerySource does the I/O.
-// One query is outstanding at a time. next() returns it. find() looks for its answer in all bytes
-// since it was sent (at most kMaxAnswer; of more, the oldest are dropped) and takes the latest of
-// several. Anything else is skipped: noise, partial frames, echoes, late answers to another query,
-// unsolicited lines. After give_up(), next() returns a fence, a query with a different answer, so
-// that a late answer is not taken for that of a later query. Angles are degrees as the device
-// counts them; QuerySource applies signs and zeros. Fences: docs/derivations.md.
+// One query is outstanding at a time; next() returns it. find() looks for the answer in all bytes
+// since the query was sent (at most kMaxAnswer; of more, the oldest are dropped) and takes the
+// latest of several answers. Anything else is skipped: noise, partial frames, echoes, late answers
+// to another query, unsolicited lines. After give_up(), next() returns a fence, a query with a
+// different answer, so that a late answer is not taken for that of a later query. Angles are
+// degrees of the device; QuerySource applies signs and zeros. Fences: docs/derivations.md.
 
 #include <cstddef>
 #include <cstdint>
@@ -56,20 +56,21 @@ class QueryProtocol {
   [[nodiscard]] virtual const char* name() const = 0;
   // On a new connection, before its first query: nothing is known of the device.
   virtual void restart() = 0;
-  // Never empty: an answer is awaited after each query. After give_up() its bytes differ from those
-  // before.
+  // The next query. Its bytes are never empty: an answer is awaited after each query. After
+  // give_up() they differ from the bytes of the query before.
   [[nodiscard]] virtual Query next() = 0;
   // A reading is within a turn; `begin` is the index of one of the bytes. kNone if there are no
   // bytes.
   [[nodiscard]] virtual Answer find(std::string_view bytes) = 0;
-  // Bytes that reset the device's command parser and that it does not answer; usually none.
+  // Bytes that reset the device's command parser and that the device does not answer; usually none.
   [[nodiscard]] virtual std::string give_up() = 0;
 
-  // Unrequested bytes came. If that matters, next() returns a fence, as it does after every
-  // kQueriesPerFence queries: after one surplus answer, each answer is that of the previous query.
+  // To be called when unrequested bytes came. A protocol that needs fences then returns one by
+  // next(), as after every kQueriesPerFence queries. Reason: after one surplus answer, each answer
+  // is that of the previous query.
   virtual void doubt() = 0;
-  // How the device deviates from the protocol and how that is handled, in one line; empty if it
-  // does not.
+  // How the device deviates from the protocol and how this is handled, in one line. Empty: the
+  // device does not deviate.
   [[nodiscard]] virtual std::string peculiarity() const { return {}; }
   // Over UDP, true: each datagram is a frame (VISCA's header) and is searched by itself. False for
   // lines of text.
@@ -92,7 +93,7 @@ class QueryProtocol {
   return angle_deg >= -360 && angle_deg <= 360;
 }
 
-// If zoom is read too: readings of pan and tilt per reading of zoom.
+// Readings of pan and tilt per reading of zoom, if zoom is read.
 constexpr int kReadingsPerZoom = 10;
 
 constexpr int kQueriesPerFence = 64;

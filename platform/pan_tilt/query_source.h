@@ -1,9 +1,10 @@
 #pragma once
 // QuerySource: polls a head for its position, by any QueryProtocol over any ByteLink. Polls lie on
-// a grid of rate_hz, or slower if the serial line cannot carry that. One query is outstanding at a
-// time; an answer later than the next grid point shifts the grid. A sample was true between the
-// sending of the query and the first byte of its answer. Protocols that report one axis at a time
-// give one sample for each reading of tilt, with pan interpolated to its moment (AxisPairing).
+// a grid of rate_hz, or of a lower rate if the serial line cannot carry rate_hz. One query is
+// outstanding at a time; an answer later than the next grid point shifts the grid. A sample was
+// true at some moment between the sending of the query and the first byte of its answer. Protocols
+// that report one axis at a time give one sample for each reading of tilt, with pan interpolated to
+// the moment of the tilt (AxisPairing).
 // Angles are mapped by sign and zero to the model's axes, in [-pi, pi). Late answers:
 // docs/derivations.md.
 // kDisconnected: no link, or no sample within timeout_s and three queries given up; error() says
@@ -31,7 +32,7 @@ struct QuerySourceOptions {
   AxisMapping pan;
   AxisMapping tilt;
   double rate_hz = 30;
-  double timeout_s = 1;      // without a sample for so long, the head is lost
+  double timeout_s = 1;      // after so long without a sample the head counts as lost
   double max_backoff_s = 5;  // longest pause between two attempts
 };
 

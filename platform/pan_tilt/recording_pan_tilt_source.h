@@ -1,7 +1,7 @@
 #pragma once
 // open_recorded_pan_tilt(): the telemetry.csv of a recording (recording.h), at full speed or at the
-// pace of its receive times. Without a column earliest_time_s, a sample's interval is just its
-// receive time.
+// pace of its receive times. Without a column earliest_time_s, a sample's interval has no width: it
+// is the receive time.
 
 #include <memory>
 #include <string>

@@ -10,7 +10,7 @@ namespace alidade {
 
 class SourceNotes {
  public:
-  // of: the source's name. Empty notes are ignored.
+  // of: the source's name, which precedes the note. An empty note is ignored.
   void add(const std::string& of, const std::string& note) {
     if (note.empty() || std::find(said_.begin(), said_.end(), note) != said_.end()) return;
     said_.push_back(note);

@@ -4,8 +4,9 @@
 // Pan and tilt together: 8x 09 06 12 FF -> y0 50 nibbles FF (y = x + 8), one nibble of two's
 // complement per byte: 4+4 (11 bytes), 5+4 (12) or 5+5 (13). Zoom: 8x 09 04 47 FF -> y0 50 0p 0q 0r
 // 0s FF. Errors: y0 6z ee FF. FF ends every frame and occurs nowhere else. There is no checksum. A
-// lost nibble turns 5+4 into 4+4, so a length is accepted once it came twice in a row, and then no
-// other. A changed nibble is not noticed. Sequence numbers and fences: docs/derivations.md.
+// lost nibble turns 5+4 into 4+4. So a length is accepted once it came twice in a row, and from
+// then on no other length. A changed nibble is not noticed. Sequence numbers and fences:
+// docs/derivations.md.
 
 #include <cstdint>
 #include <optional>

@@ -8,9 +8,9 @@
 // Times are seconds of one clock (the recording host's), angles are radians. A cell of an optional
 // column may be empty: the value is unknown. Unknown columns are ignored. Every line ends with a
 // newline, so that a file cut off in the middle of a number is not taken for a complete one. Stamps
-// are passed on unchecked: the clock filter handles equal or jumping ones. On failure the functions
-// return false and *error is one line: what is wrong, file:line, what would be right. parse_...()
-// take the text itself; name stands for the file in errors.
+// are passed on unchecked: the clock filter handles equal or jumping stamps. On failure the
+// functions return false and *error is one line: what is wrong, file:line, what would be right.
+// parse_...() take the text itself; name stands for the file in errors.
 
 #include <cstdint>
 #include <istream>
@@ -28,7 +28,8 @@ struct RecordingInfo {
   std::string notes;
 };
 
-// A landmark as seen in one frame; u right, v down, centre of the top-left pixel (0.5, 0.5).
+// A landmark as seen in one frame: pixel (u right, v down, centre of the top-left pixel (0.5, 0.5))
+// and sigma of each coordinate.
 struct TrackPoint {
   std::int64_t frame = 0;
   std::int64_t landmark = 0;

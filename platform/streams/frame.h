@@ -1,5 +1,5 @@
 #pragma once
-// Frames of any video source. Times are s. Those of this host are of CLOCK_MONOTONIC, and taken
+// Frames of any video source. Times are s. Times of this host are of CLOCK_MONOTONIC, and taken
 // before decoding. Which member of FrameStamp takes what a source knows: platform/video/README.md,
 // "Which stamps".
 
@@ -25,15 +25,15 @@ enum class StampedAt : std::uint8_t {
 // When and in which order a frame came. Fixed size; crosses queues by value.
 struct FrameStamp {
   std::int64_t frame = 0;  // 0, 1, 2, ...: count of the frames that this source delivered
-  // s, host CLOCK_MONOTONIC: what stamped_at says. An arrival is that of the frame's last packet,
-  // unless the source's header says: of its first byte.
+  // s, host CLOCK_MONOTONIC: the moment that stamped_at names. The arrival is that of the frame's
+  // last packet, or of its first byte if the source's header says so.
   double receive_time_s = 0;
   std::optional<double> sender_time_s;   // capture, by the sender's clock; unwrapped, any epoch
   std::optional<double> sender_utc_s;    // the same as Unix time, once RTCP or the like gives it
   std::optional<std::int64_t> sequence;  // the sender's frame count, unwrapped; a gap is a loss
   bool restarted = false;  // first after a (re)connection: sender clock and sequence start anew
-  // Of receive_time_s. Not recorded: a replay takes each for an arrival. Counts only with a
-  // sequence and without sender_time_s (frame_clock.h).
+  // What receive_time_s refers to. Not recorded: a replay takes each for an arrival. Used only with
+  // a sequence and without sender_time_s (frame_clock.h).
   StampedAt stamped_at = StampedAt::kArrival;
 };
 
@@ -43,9 +43,9 @@ struct Frame {
   int width = 0;   // px
   int height = 0;  // px
   // 8-bit luma; row v starts at luma + v * stride. Its range is as the camera sends it, 0 to 255 or
-  // 16 to 235; nothing tells which. Null if the source was told not to decode (PT mode), while it
-  // cannot (reference data was lost and the next key frame has not come), and for a picture of more
-  // than max_pixels.
+  // 16 to 235; nothing tells which. Null if the source was told not to decode (PT mode), while the
+  // source cannot decode (reference data was lost and the next key frame has not come), and for a
+  // picture of more than max_pixels.
   const std::uint8_t* luma = nullptr;
   std::ptrdiff_t stride = 0;          // bytes
   std::shared_ptr<const void> owner;  // keeps luma alive

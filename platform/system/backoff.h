@@ -1,6 +1,6 @@
 #pragma once
-// Backoff: the pauses between attempts to connect. They double from 0.25 s up to a limit. Call
-// reset() after a success.
+// Backoff: the pauses between attempts to connect. They double from 0.25 s up to a limit, and begin
+// anew after reset(), which is to be called after a success.
 
 #include <algorithm>
 

@@ -1,7 +1,7 @@
 #pragma once
 // ByteLink: bytes to and from a device over a serial line, TCP or UDP, so that a protocol runs over
-// any of them. It can be closed and reopened any number of times (a plug pulled and put back). No
-// call waits longer than its timeout.
+// any of them. A link can be closed and reopened any number of times (a plug pulled and put back).
+// No call waits longer than its timeout.
 //
 // Serial: 8 data bits, no parity, 1 stop bit, raw, no flow control; one program at a time. TCP:
 // without delay of small packets. UDP: to and from one address; each receive() returns one
@@ -46,8 +46,9 @@ class ByteLink {
   ByteLink(const ByteLink&) = delete;
   ByteLink& operator=(const ByteLink&) = delete;
 
-  // Starts to open; on failure see error(). After kOk call finish_open(), until it is not kTimeout
-  // or too late. A name's look-up goes on over close() and open().
+  // Starts to open; on failure see error(). After kOk, finish_open() is to be called until its
+  // result is not kTimeout, or the caller gives up. A name's look-up goes on over close() and
+  // open().
   [[nodiscard]] LinkStatus open();
   [[nodiscard]] LinkStatus finish_open(double timeout_s);
   void close() { line_.reset(); }
@@ -55,8 +56,8 @@ class ByteLink {
   // For a few bytes: if the system does not take all of them at once, the link counts as lost.
   [[nodiscard]] LinkStatus send(std::string_view bytes);
 
-  // Waits for bytes and puts those that are there into *bytes, at most 512. While closed it only
-  // waits.
+  // Waits for bytes and puts what has come into *bytes, at most 512 bytes. While the link is closed
+  // the call only waits.
   [[nodiscard]] LinkStatus receive(std::string* bytes, double timeout_s);
 
   void stop();  // every later call that could wait returns kStopped

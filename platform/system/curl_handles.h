@@ -37,8 +37,8 @@ constexpr const char* kHeadersTooLong = "the answer's headers are longer than 64
 // The message to the user on why the answer was 401; methods as in make_http_handle().
 [[nodiscard]] std::string login_error(CURL* easy, const std::string& user, long methods);
 
-// Where the complete answer from the URL `asked` redirects to. url and error are empty if it is not
-// a redirection.
+// Where the complete answer from the URL `asked` redirects to. If the answer is not a redirection,
+// url and error of the result are empty.
 [[nodiscard]] Redirection redirection_of(CURL* easy, const Url& configured,
                                          const std::string& asked, LinkRules::Redirects rule);
 

@@ -1,8 +1,9 @@
 #pragma once
 // Errand: runs a call that may block for long and cannot be interrupted, such as the system's
-// look-up of a name, on a thread of its own; one call at a time. The owner waits for descriptor()
-// as long as it wants, and may go away meanwhile. So the call must own what it uses. Thread: niced,
-// detached, with a small stack. Used by one thread at a time.
+// look-up of a name, on a thread of its own; one call at a time. The errand's owner waits for
+// descriptor() as long as it wants, and may go away meanwhile. So the call must own what it uses.
+// The call's thread is niced and detached, with a small stack. An Errand is for one thread at a
+// time.
 
 #include <atomic>
 #include <functional>
@@ -22,7 +23,7 @@ class Errand {
   [[nodiscard]] bool begin(std::function<void()> call);
   // The last call, if any, has returned; what it wrote can be read.
   [[nodiscard]] bool is_over() const { return !state_ || state_->over; }
-  // Readable from then on; negative: none has begun.
+  // Readable once the last call has returned; negative: no call has begun.
   [[nodiscard]] int descriptor() const { return state_ ? state_->event.get() : -1; }
 
  private:

@@ -1,9 +1,9 @@
 #pragma once
-// FileLock: reserves what is stored under PATH for one process. It is a kernel lock (flock) on
-// PATH.lock, which holds the process number and command of the owner. The lock ends with its
-// process, however that ends; the file PATH.lock stays unless its creator removes it. Processes on
-// other hosts are excluded if the network file system supports locks. Advisory: readers need no
-// lock.
+// FileLock: reserves what is stored under PATH for one process, by a kernel lock (flock) on
+// PATH.lock. This file holds the process number and command of the owner. The lock ends with the
+// owner, even if the owner is killed; the file PATH.lock stays unless its creator removes it.
+// Processes on other hosts are excluded if the network file system supports locks. Advisory:
+// readers need no lock.
 
 #include <string>
 

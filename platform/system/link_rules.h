@@ -29,7 +29,8 @@ struct LinkRules {
 // Most redirections in a row on one link.
 constexpr int kMostRedirections = 5;
 
-// "the camera offers only ...": the message for a camera that demands what permits_basic() refuses.
+// "the camera offers only ...": the message for a camera that demands a basic login where
+// permits_basic() is false.
 inline constexpr const char* kOnlyBasic =
     "the camera offers no digest authentication, and by basic the password would cross the network "
     "in clear: set the camera to digest, use TLS, or, on a network that nobody else reads, set "

@@ -1,8 +1,8 @@
 #pragma once
-// NameLookup: the addresses of a host, by getaddrinfo(), which nothing can interrupt and which
-// takes minutes if a name server does not answer. Here it is an Errand: the owner waits for it with
-// a deadline of its own, and may go away. Numeric addresses need no thread. Used by one thread at a
-// time.
+// NameLookup: the addresses of a host, by getaddrinfo(). Nothing can interrupt getaddrinfo(), and
+// it takes minutes if a name server does not answer. Therefore it runs as an Errand: the owner
+// waits with a deadline of its own, and may go away. Numeric addresses need no thread. Used by one
+// thread at a time.
 
 #include <sys/socket.h>
 
@@ -29,12 +29,14 @@ class NameLookup {
   NameLookup(std::string host, std::string port, int socket_type)
       : host_(std::move(host)), port_(std::move(port)), socket_type_(socket_type) {}
 
-  // Begins a look-up, or goes on with one that was not taken. False: no thread could be started.
+  // Begins a look-up, or goes on with a look-up whose result was not taken. False: no thread could
+  // be started.
   [[nodiscard]] bool begin();
   [[nodiscard]] bool is_over() const { return errand_.is_over(); }
-  // Readable when it is over; negative: it needed no thread.
+  // Readable when the look-up is over; negative: the look-up needed no thread.
   [[nodiscard]] int descriptor() const { return errand_.descriptor(); }
-  // When it is over: the addresses, in the resolver's order. Empty: none, for the reason *error.
+  // When the look-up is over: the addresses, in the resolver's order. Empty: none, for the reason
+  // in *error.
   [[nodiscard]] std::vector<HostAddress> take(std::string* error);
 
  private:

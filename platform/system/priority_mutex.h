@@ -1,8 +1,8 @@
 #pragma once
 // PriorityMutex: a std::mutex with priority inheritance (POSIX, PTHREAD_PRIO_INHERIT), for threads
-// of different priorities: while a thread waits, the owner runs at that thread's priority. With a
-// std::mutex, a SCHED_FIFO thread would wait for an owner that gets no processor, tens of
-// milliseconds on a busy machine. Use it with std::lock_guard.
+// of different priorities: while a thread waits, the owner runs at the waiting thread's priority.
+// With a std::mutex, a SCHED_FIFO thread would wait for an owner that gets no processor, tens of
+// milliseconds on a busy machine. To be used with std::lock_guard.
 
 #include <pthread.h>
 

@@ -41,12 +41,12 @@ struct RealtimeReport {
 };
 
 // Locks all memory of the process, present and future. Keeps malloc from returning blocks below
-// kFetchedAlone to the kernel, as fresh memory costs a page fault. Paged in at once: all data, and
-// this program and the C and C++ libraries. Left out of that are their exception tables, where
-// these lie among constants, and program code that no thread on a record's way enters
-// (cmake/batch_code.ld). Left-out and later memory stays once it was touched. Of other libraries
-// (100 MB of codecs) only pages used from now on stay; pages that only the loader needed are
-// released. Call it before other threads start, or their whole stacks are paged in.
+// kFetchedAlone to the kernel, as fresh memory costs a page fault. Pages in at once all data, this
+// program and the C and C++ libraries, except exception tables that lie among constants and program
+// code that no thread on a record's way enters (cmake/batch_code.ld). Excepted and later memory
+// stays once it was touched. Of other libraries (100 MB of codecs) only pages used from now on
+// stay; pages that only the loader needed are released. To be called before other threads start, or
+// their whole stacks are paged in.
 inline constexpr std::size_t kFetchedAlone = std::size_t{512} << 10;  // bytes
 [[nodiscard]] RealtimeReport lock_process_memory();
 
@@ -60,11 +60,12 @@ inline constexpr std::size_t kPrefaultedStack = std::size_t{256} << 10;  // byte
 void return_freed_memory();
 
 // Lets the calling thread run only when no other wants to (SCHED_IDLE, else the highest nice
-// value), whatever scheduling it inherited. Returns one line if that was refused; empty if granted.
+// value), whatever scheduling the thread inherited. Returns one line if this was refused; empty:
+// granted.
 [[nodiscard]] std::string set_lowest_priority();
 
 // Returns another thread to the normal policy, so that a thread that is to end does so even on a
-// busy machine. False: the kernel refused, as it does below RLIMIT_NICE 20 without CAP_SYS_NICE.
+// busy machine. False: the kernel refused, as with an RLIMIT_NICE below 20 without CAP_SYS_NICE.
 bool set_usual_priority(pthread_t thread);
 
 // Page faults of the calling thread since it started.
@@ -73,7 +74,8 @@ struct PageFaults {
   long major = 0;  // the page had to be read from disk
 };
 [[nodiscard]] PageFaults thread_page_faults();
-// The same of another thread of this process, by its kernel thread id; zeros once it has ended.
+// The same of another thread of this process, by its kernel thread id. Zeros once the thread has
+// ended.
 [[nodiscard]] PageFaults page_faults_of(int thread);
 [[nodiscard]] int this_thread();
 

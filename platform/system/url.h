@@ -1,7 +1,7 @@
 #pragma once
 // Splits a URL (with libcurl) so that the password can be kept apart from what is shown and logged.
-// `bare` is for connecting: cameras take passwords in a query, too. Whoever shows or logs a URL
-// shows `shown`, or shown_url() of a foreign one.
+// `bare` is for connecting: its query may hold a password, as cameras take one there, too. Only
+// `shown`, or shown_url() of a foreign URL, may be shown or logged.
 
 #include <string>
 #include <string_view>
@@ -29,7 +29,7 @@ struct Url {
 // A foreign address for messages: its first 120 bytes, escaped, without_secrets().
 [[nodiscard]] std::string shown_url(std::string_view url);
 
-// True if the URL's scheme, or the scheme alone, is one over TLS: https, rtsps, mqtts.
+// True if the text is a URL over TLS, or the scheme of one: https, rtsps, mqtts.
 [[nodiscard]] bool is_by_tls(std::string_view url_or_scheme);
 
 // Resolves `told`, which may be relative, against the URL `base`. Empty if the result is not a URL.

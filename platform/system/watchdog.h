@@ -1,7 +1,7 @@
 #pragma once
-// Watchdog: ends a call that has no deadline of its own. Lives as long as the call. At the
-// deadline, `bark` runs at most once, on a thread of the watchdog; it must be safe there. Costs a
-// thread, so use it for calls made once per connection.
+// Watchdog: ends a call that has no deadline of its own. Lives as long as the call. patience_s
+// after construction `bark` runs, at most once, on a thread of the watchdog; `bark` must be safe
+// there. Costs a thread, so it is for calls made once per connection.
 
 #include <chrono>
 #include <condition_variable>
@@ -26,7 +26,7 @@ class Watchdog {
   Watchdog(const Watchdog&) = delete;
   Watchdog& operator=(const Watchdog&) = delete;
 
-  // Call it when the call has returned. True if the deadline came first.
+  // To be called when the watched call has returned. True if the deadline came first.
   [[nodiscard]] bool stand_down() {
     {
       const std::lock_guard<std::mutex> lock(mutex_);

@@ -1,7 +1,8 @@
 #pragma once
 // Whole files. A file is written beside its place, synced to the disk and renamed. A reader, or a
-// power cut, finds the old file or the new one, never a part. No shared state. While it is written
-// it is called NAME.unfinished-XXXXXX and is locked; an unlocked one was left by a killed process.
+// power cut, finds the old file or the new one, never a part. No shared state. While a file is
+// written it is called NAME.unfinished-XXXXXX and is locked; an unlocked file of such a name was
+// left by a killed process.
 // Reading accepts only regular files, whatever the name refers to: a pipe, device or folder could
 // block or have no end. A file larger than its kind can be is refused.
 
@@ -14,8 +15,8 @@
 
 namespace alidade {
 
-// First removes what killed processes left of this file. On false the old file stays, nothing
-// unfinished is left, and *error is `path: cannot be written: why`.
+// First removes unfinished files that killed processes left of this file. On false the old file
+// stays, nothing unfinished is left, and *error is `path: cannot be written: why`.
 [[nodiscard]] bool write_file_atomically(const std::string& path, const std::string& content,
                                          std::string* error);
 
@@ -30,7 +31,8 @@ int remove_unfinished(const std::string& folder,
 // Writes all bytes, with as many calls as needed. On false the reason is in errno.
 [[nodiscard]] bool write_all(int descriptor, std::string_view bytes);
 
-// On failure returns a closed one, and *error is `path: cannot be read: why`. Does not wait.
+// Opens a file for reading. Does not wait. On failure the result is not open, and *error is
+// `path: cannot be read: why`.
 [[nodiscard]] FileDescriptor open_to_read(const std::string& path, std::string* error);
 
 // For text that people write or read: YAML, passwords, labels.

@@ -1,8 +1,9 @@
 #pragma once
 // What libav does not report of a picture coded by H.264 (ITU-T H.264, 7.3) or H.265 (ITU-T H.265,
-// 7.3): whether decoding can start there, and a promise of reordering that no picture keeps. Data
-// is as libavformat delivers it: NAL units behind start codes (Annex B), from the first one of the
-// picture. Any bytes are safe. Only the data up to the first slice is read. Pure functions.
+// 7.3): whether decoding can start at this picture, and a permission to reorder that no picture
+// uses. Data is as libavformat delivers it: NAL units behind start codes (Annex B), from the
+// picture's first NAL unit. Any bytes are safe. Only the data up to the first slice is read. Pure
+// functions.
 
 #include <cstddef>
 #include <cstdint>
@@ -14,7 +15,7 @@ namespace alidade {
 enum class CodedBy { kH264, kH265 };
 
 struct CodedPicture {
-  bool has_beginning = false;   // its first slice is here, with the top of the picture
+  bool has_beginning = false;   // the data has the first slice, with the top of the picture
   bool needs_no_other = false;  // H.264: IDR; H.265: IRAP
   // From a recovery point (SEI): decoding may start here, and the picture is right after this
   // number of pictures (in H.264 only reference pictures count). At most 2^15.

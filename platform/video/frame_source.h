@@ -1,6 +1,6 @@
 #pragma once
 // FrameSource: one interface for all sources of video frames (RTSP, RTP, MJPEG over HTTP, V4L2,
-// recordings). A source owns its connection: it opens it, detects its loss, and reopens it with
+// recordings). A source owns its connection: opens it, detects its loss, and reopens it with
 // back-off. read() blocks only the calling (capture) thread. stop() may be called from any other
 // thread and makes a blocked read() return soon. Not for the real-time thread: read() allocates and
 // waits.
@@ -30,7 +30,7 @@ class FrameSource {
   [[nodiscard]] virtual ReadStatus read(Frame& frame, double timeout_s) = 0;
 
   // Called on the reading thread: the frame just delivered cannot be used, for this reason. True:
-  // the source closes the connection, read() reports kDisconnected with the reason, and it
+  // the source closes the connection, read() reports kDisconnected with the reason, and the source
   // reconnects after a growing pause. False: the source has no connection to close.
   [[nodiscard]] virtual bool refuse(const std::string& /*reason*/) { return false; }
 
@@ -45,11 +45,11 @@ class FrameSource {
   [[nodiscard]] virtual std::string name() const = 0;
 
   // One line for the user: what is awaited on an open connection, since when, and how to shorten
-  // it. Empty: nothing, or not for long. Thread-safe.
+  // the wait. Empty: nothing is awaited, or not for long. Thread-safe.
   [[nodiscard]] virtual std::string waiting() const { return ""; }
 
-  // One line for the user: a fault of a stream whose pictures do come, and how it was handled. Each
-  // kind is reported once. Empty: nothing new. Thread-safe.
+  // One line for the user: a fault of a stream whose pictures do come, and how the fault was
+  // handled. Each kind is reported once. Empty: nothing new. Thread-safe.
   [[nodiscard]] virtual std::string remark() { return ""; }
 
   // Since the source was created; thread-safe. Zeros if the source does not count.

@@ -35,16 +35,17 @@ class LumaDecoder {
   };
 
   // low_delay: never hold back a picture for reordering, whatever the stream's parameter sets
-  // permit, and bound the pictures that it keeps (PictureBudget); H.264 and H.265 data must be
-  // Annex B then. A picture of more than max_pixels, counted in whole blocks, cannot be decoded.
+  // permit, and bound the pictures that the decoder keeps (PictureBudget); H.264 and H.265 data
+  // must then be Annex B. A picture of more than max_pixels, counted in whole blocks, cannot be
+  // decoded.
   [[nodiscard]] bool open(const AVCodecParameters& parameters, bool low_delay,
                           std::int64_t max_pixels = kMostFilePixels);
 
-  // Takes one whole picture, or null for the end of the stream. False: the data cannot be decoded;
-  // for good, if keeps_too_many().
+  // Takes one whole picture, or null for the end of the stream. False: the data cannot be decoded.
+  // If keeps_too_many(), no later data can be either.
   [[nodiscard]] bool send(const AVPacket* packet);
 
-  // Returns the next decoded picture; call it until kNone.
+  // The next decoded picture; to be called until the result is kNone.
   [[nodiscard]] Result receive(Picture* picture);
 
   // Forgets all pictures, for a new start.

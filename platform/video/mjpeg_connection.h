@@ -1,8 +1,8 @@
 #pragma once
 // MjpegConnection: the connections to an MJPEG camera over HTTP (libcurl), one after the other:
 // login, redirections, one deadline for each picture, and the pictures' parts of the stream as they
-// come, each with the arrival of its first byte. Part of MjpegSource. All of it belongs to the
-// receiving thread, except for interrupt() and damaged(), which any thread may call.
+// come, each with the arrival of its first byte. Part of MjpegSource. For the receiving thread,
+// except interrupt() and damaged(), which any thread may call.
 
 #include <atomic>
 #include <cstddef>
@@ -25,7 +25,8 @@ class MjpegConnection {
   static constexpr const char* kNoCurl = "libcurl does not start";
   using TakePicture = std::function<void(MultipartPart picture)>;
 
-  // options: user and password are those that count, wherever they were given. url: options.url.
+  // options: user and password must be those to log in with, also if the URL gave them. url:
+  // options.url, parsed.
   MjpegConnection(const MjpegSourceOptions& options, const Url& url, TakePicture take_picture);
 
   // False: kNoCurl.
@@ -34,7 +35,7 @@ class MjpegConnection {
   [[nodiscard]] ReadStatus receive(const std::function<bool()>& ending, std::string* error);
   // Wakes receive(), which then asks ending().
   void interrupt();
-  // Parts that should have been pictures and are not, or that were discarded.
+  // Number of parts that should have been pictures and are not, or that were discarded.
   [[nodiscard]] std::int64_t damaged() const { return damaged_; }
 
  private:

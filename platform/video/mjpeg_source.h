@@ -2,11 +2,11 @@
 // open_mjpeg(): JPEG pictures in the answer to one HTTP request (multipart/x-mixed-replace;
 // libcurl, multipart_scanner.h, libjpeg-turbo). A receiving thread connects, stamps and queues;
 // read() decodes. The first read() starts the thread, which inherits its scheduling.
-// receive_time_s: arrival of the first byte of the picture's part, headers included; unlike the
-// last byte's it does not depend on the picture's size. sender_time_s: the part's X-Timestamp if it
-// can be true (stamp_guard.h). Damaged pictures are skipped and counted; many in a row end the
-// connection. If the reader is too slow, the oldest waiting pictures are dropped and counted.
-// Sender clock, copies and statuses: docs/derivations.md.
+// receive_time_s: arrival of the first byte of the picture's part, headers included. Unlike the
+// arrival of the last byte, it does not depend on the picture's size. sender_time_s: the part's
+// X-Timestamp if it can be true (stamp_guard.h). Damaged pictures are skipped and counted; many in
+// a row end the connection. If the reader is too slow, the oldest waiting pictures are dropped and
+// counted. Sender clock, copies and statuses: docs/derivations.md.
 
 #include <cstddef>
 #include <cstdint>
@@ -25,7 +25,7 @@ struct MjpegSourceOptions {
   std::string password;
   LinkRules rules;
   bool decode = true;        // false: Frame::luma stays null, only the JPEG headers are read
-  double timeout_s = 3;      // without a picture for so long, the connection is lost
+  double timeout_s = 3;      // after so long without a picture the connection counts as lost
   double max_backoff_s = 5;  // longest pause between two attempts
   // A larger picture is not decoded: its frame has its size, but no luma, and it is not copied to a
   // file. A part longer than such a picture can be (most_picture_bytes) is discarded.

@@ -8,8 +8,8 @@
 // (FF D9), otherwise at the next delimiter. So a camera that sends no length delivers a picture
 // only when the next delimiter comes. The cost per byte does not depend on how lines and parts cut
 // the bytes. No I/O, no clock; exceptions only for memory, which is bounded by max_part_bytes and
-// the fed piece. After each feed() call next() until it returns false. Tolerated deviations:
-// docs/derivations.md.
+// the fed piece. After each feed(), next() is to be called until it returns false. Tolerated
+// deviations: docs/derivations.md.
 
 #include <cstddef>
 #include <cstdint>
@@ -22,9 +22,9 @@ namespace alidade {
 
 struct MultipartPart {
   std::string body;
-  double first_byte_s = 0;            // arrival of the first byte after the delimiter's line
+  double first_byte_s = 0;            // s; arrival of the first byte after the delimiter's line
   std::string content_type;           // lower case, without parameters; empty if not given
-  std::optional<double> timestamp_s;  // X-Timestamp: sender's clock, any epoch
+  std::optional<double> timestamp_s;  // s; X-Timestamp: sender's clock, any epoch
 };
 
 // False: content_type is not multipart/*. *boundary is empty if none is declared.
@@ -44,8 +44,8 @@ class MultipartScanner {
   // without end.
   [[nodiscard]] std::int64_t discarded() const { return discarded_; }
 
-  // Bytes that must still come before a part can be complete, at least 1: the rest of its
-  // Content-Length if the previous part kept to its own, else 1.
+  // Bytes that must still come before a part can be complete, at least 1: the rest of the part's
+  // Content-Length if the previous part ended at its own Content-Length, else 1.
   [[nodiscard]] std::size_t missing_bytes() const;
 
   // Bytes kept for later, not counting complete parts.

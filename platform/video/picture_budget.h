@@ -1,8 +1,9 @@
 #pragma once
-// PictureBudget: bounds what a decoder of live H.264 or H.265 keeps. A peer may claim 16 reference
-// pictures of the largest size; cameras use one to four. A decoder gets memory for a picture only
-// while those it keeps take at most kMost plus that picture's size. A picture that was given out
-// counts only as long as the decoder keeps it, too. One thread at a time; outlives the decoder.
+// PictureBudget: bounds the pictures that a decoder of live H.264 or H.265 keeps. A peer may claim
+// 16 reference pictures of the largest size; cameras use one to four. A decoder gets memory for a
+// picture only while its kept pictures take at most kMost plus that picture's size. A picture that
+// was given out to the caller counts while the decoder keeps it, and no longer. One thread at a
+// time; must outlive the decoder.
 
 #include <cstdint>
 #include <utility>
@@ -16,9 +17,9 @@ class PictureBudget {
   // Bytes; libavcodec keeps up to 40 % more beside each picture.
   static constexpr std::int64_t kMost = 44 << 20;
 
-  // Before the decoder is opened.
+  // Bounds this decoder. To be called before the decoder is opened.
   void bound(AVCodecContext* context);
-  // Call it for each picture that the decoder gives.
+  // To be called for each picture that the decoder gives.
   void give_out(AVFrame* frame) const;
   [[nodiscard]] bool is_bound() const { return bound_; }
   // True if a picture was refused since the last call.

@@ -1,13 +1,13 @@
 #pragma once
 // PictureEnds: finds the last piece of each picture, losses, and capture times.
 //
-// libavformat sorts RTP packets and returns the piece of an H.264 or H.265 picture in each. It does
-// not return the marker that ends the picture, without which the end shows only with the next
+// libavformat sorts RTP packets and returns the piece of an H.264 or H.265 picture in each. The
+// marker that ends the picture is not returned. Without the marker the end shows only with the next
 // picture's first packet, one period late. So this class notes the headers of incoming packets and
 // counts the pieces that come out. A picture whose packets came in order up to its marker is
-// complete when as many pieces came out. After a loss or reordering, and for a sender that sets
-// markers within pictures, the end is the start of the next picture. Losses show in the sequence
-// numbers. Fixed memory. One thread at a time.
+// complete when as many pieces came out as packets went in. After a loss or reordering, and for a
+// sender that sets markers within pictures, the end is the start of the next picture. Losses show
+// in the sequence numbers. Fixed memory. One thread at a time.
 
 #include <array>
 #include <cstddef>
@@ -20,7 +20,7 @@ namespace alidade {
 
 class PictureEnds {
  public:
-  // Call it for each packet that goes into libavformat.
+  // To be called for each packet that goes into libavformat.
   void packet_in(const RtpHeader& header);
 
   struct Piece {
@@ -29,17 +29,17 @@ class PictureEnds {
                                           // so far gives it
   };
 
-  // Call it for each piece that comes out, with its time stamp: ticks, unwrapped, with another
-  // zero.
+  // To be called for each piece that comes out. pts: its time stamp, ticks of the RTP clock,
+  // unwrapped, with another zero than RtpHeader::timestamp.
   [[nodiscard]] Piece piece_out(std::int64_t pts);
 
   struct Loss {
-    bool within = false;  // within the picture, or unknown
-    bool before = false;  // between it and the previous picture
+    bool within = false;  // a loss within the picture, or it is unknown whether there was one
+    bool before = false;  // a loss between the picture and the previous one
   };
 
-  // Losses of the picture with this time stamp, after its last piece came out. Call it once per
-  // picture, in order.
+  // Losses of the picture with this time stamp, after its last piece came out. To be called once
+  // per picture, in order.
   [[nodiscard]] Loss loss_of(std::int64_t pts);
 
  private:

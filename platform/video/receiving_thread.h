@@ -58,8 +58,8 @@ class ReceivingThread {
   // For the connection: true if it is to end.
   [[nodiscard]] bool ending() const { return stopped_ || refused_; }
 
-  // For read()'s thread: the connection's content is useless, for this reason, which next() will
-  // report. Ends the connection and clears the queue. The pauses grow as long as each new
+  // For read()'s thread: the connection's content is useless, for this reason. next() will report
+  // the reason. Ends the connection and clears the queue. The pauses grow as long as each new
   // connection is refused, too.
   void refuse(std::string reason) {
     {
@@ -119,7 +119,7 @@ class ReceivingThread {
     }
   }
 
-  // For the connection: queues a picture of this size.
+  // For the connection: queues a picture. bytes: its size.
   void push(Picture picture, std::size_t bytes) {
     {
       const std::lock_guard<std::mutex> lock(mutex_);

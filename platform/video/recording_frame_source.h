@@ -2,11 +2,10 @@
 // open_recorded_frames(): the frames of a recording (recording.h), at full speed or at the pace of
 // their receive times. Stamps and frame numbers are those of frames.csv. Pictures come from
 // video.mkv (row k of frames.csv belongs to picture k) or from frames/<frame, 6 digits>.png, .jpg
-// or .pgm. They must have an 8-bit luma plane (grey or YUV) and recording.yaml's size. A recording
-// with tracks.csv instead of pictures, and any recording if decode is false, gives frames without
-// luma. Pictures that cannot be decoded are skipped and counted. If video.mkv ends before
-// frames.csv, the recording ends there; missing_frames() is the number of rows left. B-frames:
-// docs/derivations.md.
+// or .pgm: 8-bit luma (grey or YUV) of recording.yaml's size. A recording with tracks.csv instead
+// of pictures, and any recording if decode is false, gives frames without luma. Pictures that
+// cannot be decoded are skipped and counted. If video.mkv ends before frames.csv, the recording
+// ends there; missing_frames() is the number of rows left. B-frames: docs/derivations.md.
 
 #include <cstdint>
 #include <memory>

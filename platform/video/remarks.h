@@ -32,7 +32,7 @@ class Remarks {
   std::deque<std::string> new_;
 };
 
-// For a time stamp that cannot be true and is off by off_s.
+// The remark on a time stamp that cannot be true, as it is off by off_s.
 [[nodiscard]] inline std::string bad_stamp_remark(double off_s) {
   char text[192];
   std::snprintf(text, sizeof text,

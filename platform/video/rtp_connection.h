@@ -2,12 +2,12 @@
 // RtpConnection: one connection to an RTSP or RTP sender; returns whole compressed pictures with
 // their stamps. Part of RtpSource, which reconnects, queues and decodes.
 //
-// A transport receives the packets; libavformat unpacks them (its SDP demuxer with custom I/O). Its
-// parser is off, because it returns, and so stamps, a picture only with the first packet of the
-// next. Instead, pieces with the same RTP timestamp are joined here up to the picture's marker
-// (picture_ends.h). Blocks. A wait ends with interrupt(), or after timeout_s without a whole
-// picture: RTCP reports of a camera with a hanging encoder, or packets of another stream, are no
-// sign of life.
+// A transport receives the packets; libavformat unpacks them (its SDP demuxer with custom I/O).
+// libavformat's parser is off, because it returns, and so stamps, a picture only with the first
+// packet of the next picture. Instead, pieces with the same RTP timestamp are joined here up to the
+// picture's marker (picture_ends.h). Blocks. A wait ends with interrupt(), or after timeout_s
+// without a whole picture: RTCP reports of a camera with a hanging encoder, or packets of another
+// stream, are no sign of life.
 
 #include <cstdint>
 #include <memory>
@@ -71,7 +71,7 @@ class RtpConnection {
   [[nodiscard]] std::string foreign_kind() const;
   [[nodiscard]] std::int64_t garbage() const { return transport_ ? transport_->garbage() : 0; }
   [[nodiscard]] std::int64_t bad_stamps() const { return bad_stamps_; }
-  // By how much the last of these was off.
+  // s; by how much the last of the bad stamps was off.
   [[nodiscard]] double bad_stamp_off_s() const { return bad_stamp_off_s_; }
 
  private:

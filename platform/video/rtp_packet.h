@@ -1,7 +1,7 @@
 #pragma once
-// Fields of an RTP packet header (RFC 3550, 5.1) that give a picture's end and capture time, which
-// libavformat does not report. Also corrects timestamps that libavformat cannot handle. No I/O; no
-// allocation.
+// The fields of an RTP packet header (RFC 3550, 5.1) for a picture's end and capture time:
+// libavformat does not report these two. Also corrects timestamps that libavformat cannot handle.
+// No I/O; no allocation.
 
 #include <cstddef>
 #include <cstdint>
@@ -27,12 +27,14 @@ struct RtpHeader {
 [[nodiscard]] std::optional<std::uint32_t> reporting_source(const std::uint8_t* data,
                                                             std::size_t size);
 
-// Hides two timestamps from libavformat. It takes a first timestamp of 0 for "none yet" and gives
-// the second picture the same stamp; in that case all timestamps, and those of sender reports, are
-// moved by a second. It takes the largest one for "unknown"; that is replaced by one tick less.
+// Hides two timestamps from libavformat. libavformat takes a first timestamp of 0 for "none yet"
+// and gives the second picture the same stamp. If the first timestamp is 0, all timestamps, also of
+// sender reports, are moved by a second. libavformat takes the largest timestamp for "unknown"; so
+// the largest is replaced by one tick less.
 class BearableTimestamps {
  public:
-  // Call it for each RTP and RTCP packet of a connection, in order of arrival.
+  // Changes the packet in place. To be called for each RTP and RTCP packet of a connection, in
+  // order of arrival.
   void move(std::uint8_t* data, std::size_t size);
 
  private:

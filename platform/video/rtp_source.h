@@ -30,10 +30,10 @@ struct RtpSourceOptions {
   Transport transport = Transport::kTcp;  // rtsp:// only: RTP interleaved with RTSP, or UDP;
                                           // rtsps:// supports kTcp only
   bool decode = true;  // false: Frame::luma stays null, only the first frame is decoded
-  // rtsps:// only: PEM file with the camera's own certificate or its authority's, replacing the
-  // system's. The camera's own is accepted whatever its name and dates.
+  // rtsps:// only: PEM file with the camera's own certificate or its authority's, in place of the
+  // system's authorities. The camera's own certificate is accepted whatever its name and dates.
   std::string certificate_file;
-  double timeout_s = 3;      // without a whole picture for so long, the connection is lost
+  double timeout_s = 3;      // after so long without a whole picture the connection is lost
   double max_backoff_s = 5;  // longest pause between two attempts
   // A larger picture is not decoded: its frame has its size, but no luma, and it is not copied to a
   // file.

@@ -1,7 +1,7 @@
 #pragma once
 // Sources of RTP packets: UDP ports (here), alone or with an RTSP session (rtsp_session.h). Part of
-// RtpConnection, which unpacks the packets. open() and receive() block until deadline_s
-// (CLOCK_MONOTONIC) at most. After interrupt(), which any thread may call, they and all later calls
+// RtpConnection, which unpacks the packets. open() and receive() block until deadline_s (s,
+// CLOCK_MONOTONIC) at most. After interrupt(), which any thread may call, these and all later calls
 // return within 0.1 s.
 
 #include <array>
@@ -22,7 +22,7 @@ namespace alidade {
 // A received RTP or RTCP packet.
 struct ReceivedPacket {
   std::size_t size = 0;  // bytes
-  // CLOCK_MONOTONIC; the kernel's time if it gives one, else when the packet was read.
+  // s, CLOCK_MONOTONIC; the kernel's time if it gives one, else when the packet was read.
   double arrival_s = 0;
 };
 
@@ -43,10 +43,11 @@ class RtpTransport {
 
   // Of the open transport: SSRC of the packets to come, if the sender announced it.
   [[nodiscard]] virtual std::optional<std::uint32_t> agreed_source() const { return std::nullopt; }
-  // Packets from others than the sender, which are left out, and a description of those others.
+  // Number of packets from others than the sender, which are left out, and a description of these
+  // others.
   [[nodiscard]] virtual std::int64_t foreign() const { return 0; }
   [[nodiscard]] virtual std::string foreign_kind() const { return ""; }
-  // Skipped bytes that belong to no packet.
+  // Number of skipped bytes that belong to no packet.
   [[nodiscard]] virtual std::int64_t garbage() const { return 0; }
 };
 
@@ -59,7 +60,8 @@ class RtpPorts {
   static constexpr double kGather_s = 150e-6;
 
   // address: the multicast group, or the sender's address. senders: whose packets are accepted, on
-  // both ports. choice, which must outlive the ports, decides further; null: all of theirs.
+  // both ports. choice: decides among these packets, and must outlive the ports; null: all are
+  // taken.
   [[nodiscard]] ReadStatus open(const std::string& address, int port, const UdpSenders& senders,
                                 std::string* error, SenderChoice* choice = nullptr);
   [[nodiscard]] ReadStatus receive(double deadline_s, std::uint8_t* data, std::size_t capacity,

@@ -4,9 +4,9 @@
 //   "RTSP/1.0 ..." or "METHOD ..."          a message: printable head, empty line, body by
 //                                           Content-Length. Before set_channels() the head may
 //                                           have letters beyond ASCII
-// Line ends between them are ignored. Anything else is garbage, skipped byte by byte up to a
-// possible packet or message; there a packet must be on one of the known channels. No I/O; each
-// byte is examined a few times; memory is bounded. One thread at a time.
+// Line ends between packets and messages are ignored. Anything else is garbage, skipped byte by
+// byte up to a possible packet or message. A packet after garbage must be on one of the known
+// channels. No I/O; each byte is examined a few times; memory is bounded. One thread at a time.
 
 #include <cstddef>
 #include <cstdint>
@@ -45,10 +45,10 @@ class RtspFraming {
 
   // Bytes that belong to no packet and no message.
   [[nodiscard]] std::int64_t garbage() const { return garbage_; }
-  // True if some of them started as a message longer than kMaxMessage.
+  // True if some garbage started as a message longer than kMaxMessage.
   [[nodiscard]] bool had_long_message() const { return had_long_message_; }
-  // True after more than kMaxGarbage of them in sequence: this is not RTSP, and parsing has
-  // stopped.
+  // True after more than kMaxGarbage bytes of garbage in sequence: this is not RTSP, and parsing
+  // has stopped.
   [[nodiscard]] bool is_lost() const { return garbage_in_a_row_ > kMaxGarbage; }
 
  private:

@@ -47,8 +47,8 @@ class RtspLink {
   [[nodiscard]] ReadStatus next_message(double deadline_s, RtspMessage* message,
                                         std::string* error);
 
-  // Call it before PLAY is requested: packets may follow. first: the RTP channel; RTCP has the next
-  // one.
+  // To be called before PLAY is requested, as packets may follow. first_channel: of RTP; RTCP has
+  // the next one.
   void expect_packets(int first_channel);
   // A message or a packet of the video. kTimeout: none so far.
   [[nodiscard]] ReadStatus next(double wait_s, RtspFraming::Item* item, std::string* error);

@@ -62,8 +62,8 @@ class RtspSession : public RtpTransport {
   [[nodiscard]] ReadStatus log_in(RtspMessage* answer, bool refused, std::string* error);
   // Empty if the challenge was accepted, else why not.
   [[nodiscard]] std::string accept_challenge(RtspMessage* answer);
-  // After PLAY, for what comes within the connection. kOk: a packet of the video. kTimeout: none so
-  // far.
+  // After PLAY: reads what comes within the RTSP connection. kOk: a packet of the video. kTimeout:
+  // none so far.
   [[nodiscard]] ReadStatus next_packet(double wait_s, RtspFraming::Item* packet,
                                        std::string* error);
   [[nodiscard]] ReadStatus take_message(std::string_view text, std::string* error);

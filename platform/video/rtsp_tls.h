@@ -23,12 +23,12 @@ class RtspTls {
   RtspTls(const RtspTls&) = delete;
   RtspTls& operator=(const RtspTls&) = delete;
 
-  // Call it before connecting. kFailed: *error is one line.
+  // To be called before connecting. kFailed: *error is one line.
   [[nodiscard]] ReadStatus prepare(std::string* error);
-  // Call it at the start of the handshake. The connection must not outlive this object.
+  // To be called at the start of the handshake. The connection must not outlive this object.
   void judge(GTlsConnection* connection);
 
-  // If the certificate was refused: the status, and *error is one line. kOk: it was not.
+  // If the certificate was refused: the status, and *error is one line. kOk: not refused.
   [[nodiscard]] ReadStatus refusal(std::string* error) const;
 
  private:

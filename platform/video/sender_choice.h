@@ -2,9 +2,9 @@
 // SenderChoice: whose packets of plain RTP are the video, if the description names no sender's
 // address: anyone can send to an open port or to a group.
 //
-//   on trial  one sender (address and SSRC) is followed: first the one that comes first. After
-//             timeout_s (doubled at each further trial of it) without a decodable picture, if
-//             others send, the least tried of them is next.
+//   on trial  one sender (address and SSRC) is followed, at first the one whose packet comes first.
+//             After timeout_s without a decodable picture (doubled at each further trial of the
+//             same sender), if others send, the least tried of the others is next.
 //   kept      once a picture is decoded, for as long as packets come from its address without a
 //             pause of timeout_s. A new SSRC at that address is StreamFilter's matter.
 //
@@ -30,8 +30,9 @@ class SenderChoice {
 
   explicit SenderChoice(double timeout_s) : timeout_s_(timeout_s) {}
 
-  // At the start of a connection. payload_type < 0: any. source: the SSRC that the description
-  // names; others are foreign. by_address: no address is named, so this class chooses one.
+  // To be called at the start of a connection. payload_type < 0: any. source: the SSRC that the
+  // description names; others are foreign. by_address: no address is named, so this class chooses
+  // one. now_s: s, CLOCK_MONOTONIC.
   void begin(int payload_type, std::optional<std::uint32_t> source, bool by_address, double now_s);
   // True if this packet, RTP or RTCP, is to be taken.
   [[nodiscard]] bool take(const sockaddr_storage& from, const std::uint8_t* data, std::size_t size,

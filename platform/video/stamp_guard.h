@@ -1,13 +1,14 @@
 #pragma once
 // StampGuard: decides which of a stream's time stamps can be true.
 //
-// Pictures are sent in order of capture and never arrive before it. So each stamp exceeds the one
-// before, and receive - sender falls below its minimum so far by at most kEarly_s, more than a
-// network's delay varies. Exception: a backlog, which arrives at once, with steps of the usual
-// length. Any other stamp is bad, and its picture gets none. When kAgreeing bad stamps in a row
-// follow each other by this rule, the sender's clock was changed, and the last is kJumped. If they
-// lie on the line before the last good stamp, though, that one was wrong, and the last is kGood. A
-// late picture shows nothing: it may have waited. Fixed memory, no allocation, no exceptions.
+// Pictures are sent in order of capture and never arrive before their capture. So each stamp
+// exceeds the stamp before, and receive - sender falls below its minimum so far by at most
+// kEarly_s, more than a network's delay varies. Exception: a backlog, which arrives at once, with
+// steps of the usual length. Any other stamp is bad, and its picture gets none. When kAgreeing bad
+// stamps in a row follow each other by this rule, the sender's clock was changed, and the last of
+// them is kJumped. But if they lie on the line from before the last good stamp, that good stamp was
+// wrong, and the last of them is kGood. A late picture shows nothing: it may have waited. Fixed
+// memory, no allocation, no exceptions.
 
 #include <algorithm>
 #include <cmath>
@@ -41,7 +42,8 @@ class StampGuard {
     return came_back ? Verdict::kGood : Verdict::kJumped;
   }
 
-  // The next stamp if its picture is as late as that of the last good one; 0 before the first.
+  // s, sender's clock: the stamp of a picture received at receive_s (s) that is as late as the
+  // picture of the last good stamp; 0 before the first good stamp.
   [[nodiscard]] double expected_s(double receive_s) const {
     return line_.items == 0 ? 0 : line_.last_s + (receive_s - line_.received_s);
   }

@@ -31,7 +31,8 @@ class StreamCopy {
   [[nodiscard]] bool add(const std::string& path, const AVCodecParameters& parameters, int width,
                          int height, const AVPacket& picture, double receive_time_s,
                          std::string* error);
-  // True if the last picture was not added for that reason; the file can still go on.
+  // True if the last picture was not added because of another codec or size; the file can still go
+  // on.
   [[nodiscard]] bool is_another_stream() const { return another_; }
 
  private:

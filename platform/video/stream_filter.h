@@ -3,11 +3,12 @@
 //
 //   payload type  the description's. Packets of another (metadata, audio, repair) are foreign,
 //                 whatever their time.
-//   source        the SSRC in the camera's answers if it comes, else the first that comes. Packets
-//                 of another are held back. If the current source goes on, they were foreign. If
-//                 it is silent while the other starts kPictures pictures, or for kSilent_s, the
-//                 other is the restarted sender, and the held packets are its start. If a source
-//                 left in this way returns, it is followed for good: there are two senders.
+//   source        the SSRC in the camera's answers if its packets come, else that of the first
+//                 packet. Packets of another source are held back. If the current source goes on,
+//                 the held packets were foreign. If the current source is silent while the other
+//                 starts kPictures pictures, or for kSilent_s, the other is the restarted sender,
+//                 and the held packets are its start. If a source left in this way returns, it is
+//                 followed for good: there are two senders.
 //   reports       of a foreign source are foreign.
 // Memory: kMostHeld bytes. One thread at a time.
 
@@ -38,8 +39,9 @@ class StreamFilter {
   explicit StreamFilter(int payload_type = -1, std::optional<std::uint32_t> source = std::nullopt)
       : payload_type_(payload_type), agreed_(source) {}
 
-  // Call it for each packet, RTP or RTCP, in order of arrival. True if the packet belongs to the
-  // stream or is neither RTP nor RTCP. After false, take the packets of release() first.
+  // To be called for each packet, RTP or RTCP, in order of arrival. True if the packet belongs to
+  // the stream or is neither RTP nor RTCP. After false, the packets of release() come first.
+  // arrival_s: s, CLOCK_MONOTONIC.
   [[nodiscard]] bool takes(const std::uint8_t* data, std::size_t size, double arrival_s);
 
   // The next held packet that belongs to the stream after all, in order of arrival.

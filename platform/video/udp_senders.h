@@ -1,7 +1,7 @@
 #pragma once
 // UdpSenders: whose datagrams a socket accepts, by IP address, as anyone can send to an open port
-// without a password. The port is ignored: cameras and devices on the way send from any. IPv4 and
-// IPv6. No I/O; one thread at a time.
+// without a password. The port is ignored: cameras and devices on the way send from any port. IPv4
+// and IPv6. No I/O; one thread at a time.
 
 #include <sys/socket.h>
 

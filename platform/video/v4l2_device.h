@@ -3,8 +3,8 @@
 // buffers, lends them and gives them back. Part of V4l2Source. Single-planar capture by mmap
 // streaming. A buffer goes back to the driver when the last owner of hold()'s result is gone, on
 // any thread. At close() ordinary memory with the same content replaces each buffer still held, at
-// the same address: the driver's memory would keep the device open, and once unplugged its number
-// in /dev/video* taken.
+// the same address. The driver's memory would keep the device open and, once it is unplugged, its
+// number in /dev/video* taken.
 // One thread opens, dequeues and closes; owners may end on any.
 
 #include <sys/types.h>

@@ -2,9 +2,9 @@
 // The modes that a V4L2 device offers, the wish of the user, and the choice; also the luma of raw
 // pictures. No system calls: the kernel's lists (VIDIOC_ENUM_FMT, _FRAMESIZES, _FRAMEINTERVALS) are
 // passed as V4l2Offer. A driver may list no sizes and rates. Such an offer is assumed to include
-// all, and the caller must check what the device then sets. Without a wished format, the first
-// fitting one in the order of V4l2Format is chosen: first luma that is usable in place, then packed
-// pixels, compressed pictures last.
+// all, and the caller must check which size and rate the device then sets. Without a wished format,
+// the first fitting one in the order of V4l2Format is chosen: luma that is usable in place before
+// packed pixels, compressed pictures last.
 
 #include <cstddef>
 #include <cstdint>

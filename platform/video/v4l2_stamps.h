@@ -3,8 +3,9 @@
 // sequence numbers, each buffer once and in order.
 // - Receive time: the driver's stamp if it is of CLOCK_MONOTONIC
 //   (V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC), at the start of exposure or the end of the frame, as the
-//   driver says. The difference is a constant, part of the calibrated clock offset. Without such a
-//   stamp (UNKNOWN, COPY, none), or if it is later than dequeueing, it is the moment of dequeueing.
+//   driver says. The time between the two is a constant, part of the calibrated clock offset.
+//   Without such a stamp (UNKNOWN, COPY, none), or if the stamp is later than dequeueing, the
+//   receive time is the moment of dequeueing.
 // - Sequence: the kernel's 32-bit count, unwrapped. A gap is counted: buffers that the driver lost
 //   or had no room for. A number that goes back: the driver started anew. A repeated number is a
 //   duplicate. A driver that starts with several repeats does not count, and has no sequence
@@ -32,7 +33,8 @@ class V4l2Stamps {
     bool anew = false;       // sequence does not continue from the previous buffer
   };
 
-  // Call it for each buffer, including damaged ones. dequeued_s: CLOCK_MONOTONIC.
+  // To be called for each buffer, including damaged ones. stamp_s: s, on the clock that flags name.
+  // dequeued_s: s, CLOCK_MONOTONIC.
   [[nodiscard]] Stamp update(std::uint32_t sequence, std::uint32_t flags, double stamp_s,
                              double dequeued_s) {
     Stamp result;

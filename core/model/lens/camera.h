@@ -3,8 +3,8 @@
 //   x = (d_1, d_2) / d_3,   x_d = distortion(x)
 //   u = f x_d1 + w/2 + c_u,      v = alpha f x_d2 + h/2 + c_v
 // Pixels are continuous; the centre of the top-left pixel is (0.5, 0.5). Pixels outside the image
-// have directions too. No direction beyond the distortion's limit has a pixel, and no pixel beyond
-// it has a direction (distortion.h).
+// have directions too. Beyond the distortion's limit (distortion.h) a direction has no pixel and a
+// pixel no direction.
 // Domain: f > 0, alpha > 0. Outputs are written with kOk only. No allocation.
 
 #include <cmath>

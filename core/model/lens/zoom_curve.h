@@ -20,7 +20,7 @@
 
 namespace alidade {
 
-// What does not depend on the reading, in this order.
+// The parameters that do not depend on the reading, in the order of the covariance.
 inline constexpr std::array<Parameter, 9> kSharedParameters = {
     Parameter::kAspect,   Parameter::kLineDelay, Parameter::kPanAxis0,
     Parameter::kPanAxis1, Parameter::kTiltAxis0, Parameter::kTiltAxis1,
@@ -31,8 +31,8 @@ inline constexpr int kSharedCount = static_cast<int>(kSharedParameters.size());
 // the quantity; x is 0 to 1 over the nodes:
 //   K(x, x') = L^2 + S^2 (x - 1/2)(x' - 1/2) + q^2 W(x + 1, x' + 1),   W(s, t) = m^2 (3 M - m) / 6,
 //   m, M = min, max(s, t)
-// W is that of a twice integrated random walk (Wahba 1978). Its mean is a cubic spline. Its
-// variance grows with the cube of the distance from the nodes, between and beyond them.
+// W is the covariance of a twice integrated random walk (Wahba 1978). The mean of y_j is a cubic
+// spline; its variance grows with the cube of the distance from the nodes, between and beyond them.
 struct ZoomSmoothness {
   double level_sigma = 0;
   double slope_sigma = 0;
@@ -63,7 +63,7 @@ class ZoomCurve {
     std::array<ZoomSmoothness, kZoomQuantityCount> smoothness;
     double repeatability = 0;  // sigma of log f after a movement
     Calibration shared;        // its image size and shared parameters count
-    // Node by node the quantities minus their level, with its dwell's eps.
+    // Node by node the quantities minus their level; of a dwell's node with the dwell's eps.
     Bounded<kZoomQuantityCount * kMaxNodes, 1> value;
     Bounded<kMaxSize, kMaxSize> covariance;  // of value, then the shared parameters
     // For each quantity: inverse covariance of the process at the nodes, with repeatability at
@@ -86,8 +86,9 @@ class ZoomCurve {
     return c_.reading[static_cast<std::size_t>(c_.nodes - 1)];
   }
 
-  // The calibration after a movement to this reading, with its zoom set. False for an empty curve,
-  // and for a reading that is not finite or farther beyond an end than the two ends are apart.
+  // The calibration after a movement to this reading (device units), with its zoom set. False for
+  // an empty curve, and for a reading that is not finite or farther beyond an end than the two ends
+  // are apart.
   [[nodiscard]] bool at(double reading, Calibration* calibration) const {
     if (empty() || !std::isfinite(reading)) return false;
     const double x = position(reading);

@@ -1,8 +1,8 @@
 #pragma once
-// How a camera's parameters change with its focal length. The only owner of that law:
+// How a camera's parameters change with its focal length. The law is stated nowhere else:
 //   term of order n = kappa (f / R)^n      R: half the image's diagonal, px
-// kappa is the term's distortion in the corner. It stays while f changes, and so do aspect and
-// optical centre. ZoomQuantity numbers what describes a lens at one focal length.
+// kappa is the term's distortion in the corner. kappa, aspect and optical centre stay while f
+// changes. ZoomQuantity numbers the quantities that describe a lens at one focal length.
 // Units: px, 1. Domain: f > 0, image size > 0. Pure; no allocation.
 
 #include <array>
@@ -61,7 +61,7 @@ template <class S>
 
 }  // namespace internal
 
-// What each term is multiplied by if f is multiplied by `factor`, or log f grows by `change`.
+// The factor of each term if f is multiplied by `factor`, or log f grows by `change`.
 template <class S>
 [[nodiscard]] CornerDistortion<S> distortion_by_factor(const S& factor) {
   CornerDistortion<S> out;
@@ -93,14 +93,14 @@ template <class S>
   return kappa;
 }
 
-// At the camera's focal length.
+// Sets the terms to these kappa at the camera's focal length.
 template <class S>
 void set_corner_distortion(const NonDeduced<CornerDistortion<S>>& kappa, Camera<S>* camera) {
   const CornerDistortion<S> unit = corner_unit(*camera);
   for (int i = 0; i < kDistortionCount; ++i) camera->distortion[i] = kappa[i] * unit[i];
 }
 
-// With f multiplied by `factor`.
+// Multiplies f by `factor`, which is > 0.
 template <class S>
 void zoom_by(const NonDeduced<S>& factor, Camera<S>* camera) {
   camera->focal_length *= factor;
@@ -108,7 +108,7 @@ void zoom_by(const NonDeduced<S>& factor, Camera<S>* camera) {
   for (int i = 0; i < kDistortionCount; ++i) camera->distortion[i] *= of_distortion[i];
 }
 
-// With log f increased by `change`.
+// The camera with log f increased by `change`.
 template <class S>
 [[nodiscard]] Camera<S> zoomed(const Camera<S>& camera, const NonDeduced<S>& change) {
   using std::exp;
@@ -160,7 +160,7 @@ template <class S>
   return y;
 }
 
-// Leaves aspect and image size.
+// Aspect and image size stay.
 template <class S>
 void set_zoom_quantities(const NonDeduced<ZoomQuantities<S>>& y, Camera<S>* camera) {
   using std::exp;

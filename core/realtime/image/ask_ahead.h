@@ -1,7 +1,7 @@
 #pragma once
 // ask_ahead: prefetches memory that is needed soon, without waiting. A frame and its map are larger
-// than the cache. Without it, waiting for memory takes a third of a frame's time. Reads nothing, so
-// any address is valid. No allocation.
+// than the cache; without prefetching, waiting for memory takes a third of a frame's time. Reads
+// nothing, so any address is valid. No allocation.
 
 namespace alidade {
 

@@ -44,10 +44,10 @@ class FastGrid {
   FastGrid& operator=(const FastGrid&) = delete;
 
   // Corners in reading order of their cells. Room for max_cells() always suffices.
-  // A cell keeps its best corner, the first in reading order of equals. It is returned only if it
-  // is also the best of its 3x3 pixels, which may belong to another cell. So all corners are among
-  // those of FAST with non-maximum suppression. The best score of a cell raises the threshold for
-  // its rest, which makes this fast.
+  // A cell keeps its best corner, of equal ones the first in reading order. The corner is returned
+  // only if it is also the best of its 3x3 pixels, some of which may belong to another cell. So all
+  // corners are among those of FAST with non-maximum suppression. The best score so far is the
+  // threshold for the rest of the cell, which saves time.
   [[nodiscard]] FastResult detect(const ImageView& image, std::uint8_t threshold,
                                   FastCorner* corners, int capacity);
 

@@ -3,8 +3,8 @@
 // Row v starts at luma + v * stride (bytes). The stride may exceed the width (padding, a part of a
 // larger image) and may be negative (an image stored bottom up). Coordinates: CONVENTIONS.md. They
 // are continuous, u right, v down; the centre of the first pixel is (0.5, 0.5).
-// Its range is as the camera sends it, 0 to 255 or 16 to 235; nothing tells which.
-// The view neither owns nor checks the memory, which must outlive it.
+// The range of the grey levels is as the camera sends it, 0 to 255 or 16 to 235; nothing tells
+// which. The view neither owns nor checks the memory. The memory must outlive the view.
 
 #include <cstddef>
 #include <cstdint>

@@ -56,8 +56,8 @@ enum class PrepareStatus {
                                     ReferencePatch* out);
 
 // Correction (px) to add to align()'s position for a patch prepared with A but seen as A (I + B),
-// to first order in B. Without it, a patch whose contrast is off its middle seems displaced by as
-// much as B moves that contrast.
+// to first order in B. Without the correction, a patch whose contrast is off its middle seems
+// displaced by the shift that B gives the contrast.
 [[nodiscard]] inline Vector2<double> warp_displacement(const ReferencePatch& patch,
                                                        const Matrix2<float>& B) {
   return {patch.warp_moments_u.cwiseProduct(B).sum(), patch.warp_moments_v.cwiseProduct(B).sum()};

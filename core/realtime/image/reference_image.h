@@ -1,6 +1,6 @@
 #pragma once
-// The small image by which a point is found again. It is cut out where the point was first seen,
-// and is larger than the compared patch, so that it can be warped (patch_alignment.h).
+// The small image by which a point is found again. It is cut from the image in which the point was
+// first seen, and is larger than the compared patch, so that it can be warped (patch_alignment.h).
 
 #include <array>
 #include <cstdint>

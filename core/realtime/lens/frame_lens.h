@@ -15,9 +15,9 @@ struct FrameLens {
   double rate_sigma = 0;  // 1/s
   // False: as far as readings show, the lens has not moved since the previous frame.
   bool moves = false;
-  // Slopes along the curve: d distortion in the corner (1) and d optical centre (px) per unit of
-  // log f. They carry distortion and centre on from the reading's log f to the frame's, as a coarse
-  // reading is off.
+  // Slopes along the curve: change of the distortion in the corner (1) and of the optical centre
+  // (px) per unit of log f. With them distortion and centre follow from the reading's log f to the
+  // frame's, as a coarse reading is off.
   CornerDistortion<double> corner_by_zoom = CornerDistortion<double>::Zero();
   Vector2<double> centre_by_zoom = Vector2<double>::Zero();
 };

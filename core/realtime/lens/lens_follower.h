@@ -1,13 +1,15 @@
 #pragma once
-// LensFollower: the lens of each frame once it has left the map's. It gives the camera that is
-// expected before landmarks are found, what they show, and the calibration of the answer. follow()
-// begins this, begin() or give_up() ends it. For each frame, in this order:
+// LensFollower: the lens of each frame once the lens has left the map's. It gives the camera that
+// is expected before landmarks are found, the lens that they show, and the calibration of the
+// answer. follow() begins the following, begin() or give_up() ends it. For each frame, in this
+// order:
 //   begin_frame()        takes the zoom reading, if there is one
 //   expect_after_last(), expect_by_reading()   expect a camera; the last call counts
 //   look_through()       sets the camera to find landmarks with
 //   learn()              takes what they showed
-// log f is the one with which the map's landmarks fit at phi = 0 (lens_scale.h); the camera's f is
-// f exp(phi). Fixed memory; no allocation. One thread. Derivation: docs/oe_mode.md.
+// f is here the focal length with which the map's landmarks fit at phi = 0 (lens_scale.h); the
+// camera's focal length is f exp(phi). Fixed memory; no allocation. One thread. Derivation:
+// docs/oe_mode.md.
 
 #include <cmath>
 #include <optional>
@@ -64,7 +66,7 @@ class LensFollower {
 
   // True if a lens that moved is at rest.
   [[nodiscard]] bool at_rest() const { return frames_at_rest_ >= options_.frames_at_rest; }
-  // The lens moves: landmarks found it elsewhere.
+  // The lens moves: landmarks showed another focal length.
   void note_movement() { frames_at_rest_ = 0; }
   [[nodiscard]] bool moves() const { return columns_.has_value() && !at_rest(); }
 
@@ -80,7 +82,7 @@ class LensFollower {
                                                  const Camera<double>& latest) const;
   // State of log f and its rate, without the frame's landmarks.
   [[nodiscard]] const LensTrack::State& expected() const { return expected_; }
-  // Restores the state after looks that found nothing.
+  // Restores this state after searches that found nothing.
   void expect(const LensTrack::State& state) { expected_ = state; }
   // True if the reading is believed and its log f is better known than from the previous frames.
   [[nodiscard]] bool reading_tells_more(double time_s) const;

@@ -1,12 +1,12 @@
 #pragma once
 // LensTrack: the lens from frame to frame, as landmarks show it: l = (log f, d log f / dt) at a
-// frame's middle row. f is the one with which the map's landmarks fit at phi = 0 (lens_scale.h);
-// the camera's is f exp(phi). A frame's prior is the previous state, extrapolated:
+// frame's middle row. f is the focal length with which the map's landmarks fit at phi = 0
+// (lens_scale.h); the camera's is f exp(phi). A frame's prior is the previous state, extrapolated:
 //   log f' = log f + rate dt,   rate' = rate
-// Both are driven by an acceleration that is constant between two frames and white from frame to
-// frame. At rest the first frame counts fully. Later ones count less, as neighbouring frames share
-// their landmarks' errors (variance_inflation(), covariance.h); their rate is taken as 0, not
-// learnt. Fixed memory; no allocation. One thread.
+// log f and rate are driven by an acceleration that is constant between two frames and white from
+// frame to frame. Of a lens at rest the first frame counts fully. Later frames count less, as
+// neighbouring frames share their landmarks' errors (variance_inflation(), covariance.h), and their
+// rate is taken as 0, not learnt. Fixed memory; no allocation. One thread.
 
 #include <cmath>
 

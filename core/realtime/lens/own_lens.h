@@ -13,8 +13,8 @@ namespace alidade {
 //   found - predicted + s phi = J (...) + z (dl_0 + t dl_1) + noise,   z = d u / d log f
 // s, t, J (...): see orientation_solve.h; dl: the correction of l. l is eliminated first.
 // The map's offset has learnt the calibration's errors at the map's zoom (a centre error of c px as
-// c / f). At this zoom they have another effect, and own_variances come on top: both widen the test
-// for a contradiction.
+// c / f). At this zoom these errors have another effect, and own_variances are added to them: both
+// widen the test for a contradiction.
 struct ZoomPrior {
   Vector2<double> value = Vector2<double>::Zero();  // expected minus predicted
   Matrix2<double> covariance = Matrix2<double>::Identity();
@@ -30,8 +30,8 @@ struct SolvedZoom {
   Matrix2<double> covariance = Matrix2<double>::Zero();
   Sensitivity<2> sensitivity = Sensitivity<2>::Zero();
   Vector2<double> by_lens = Vector2<double>::Zero();  // change of correction per unit of phi
-  // rad^2; the part of the innovation's covariance that the calibration's errors cause at this
-  // zoom: the offset has not learnt them.
+  // rad^2; the part of the innovation's covariance that comes from the calibration's errors at this
+  // zoom, which the offset has not learnt.
   Matrix2<double> innovation_by_calibration = Matrix2<double>::Zero();
 };
 

@@ -1,6 +1,6 @@
 #pragma once
-// ReadLens: the lens that OE mode gets for each frame: the zoom curve's at the reading or, if that
-// is not believed (reading_belief.h), at the focal length that landmarks showed.
+// ReadLens: the lens that OE mode gets for each frame: the zoom curve's at the reading or, if the
+// reading is not believed (reading_belief.h), at the focal length that landmarks showed.
 // Order of calls for a frame:
 //   begin_frame()   its time
 //   look_up()       the lens to pass on; as_found() if there are no readings
@@ -26,13 +26,13 @@ class ReadLens {
   [[nodiscard]] bool look_up(const ZoomCurve& curve, const ZoomReadings& readings, double readout_s,
                              FrameLens* lens);
   // The curve's lens at the focal length that landmarks showed lately, carried on at its rate.
-  // False: they showed no focal length, or the curve does not reach it.
+  // False: landmarks showed no focal length lately, or the curve does not reach it.
   [[nodiscard]] bool as_found(const ZoomCurve& curve, FrameLens* lens) const;
   [[nodiscard]] double found_rate() const { return found_rate_; }  // 1/s, of log f
 
   // Landmarks of this frame show this lens. rate: 1/s, of log f.
   void note_found(const Calibration& found, double rate);
-  // The same lens judges the frame's reading.
+  // Judges the frame's reading by the lens of note_found().
   void judge(const Calibration& found);
   // Of the reading that was judged last.
   [[nodiscard]] ReadingBelief belief() const { return judge_.belief(age_s()); }

@@ -1,7 +1,7 @@
 #pragma once
-// ReadingJudge: whether a zoom reading is believed. Decided here only, from the lens that landmarks
-// showed; all others ask. There are two judges: ReadLens's judges the reading, LensFollower's the
-// lens that OE mode was given.
+// ReadingJudge: whether a zoom reading is believed, by the lens that landmarks showed. This is
+// decided nowhere else. There are two judges: that of ReadLens judges the reading, that of
+// LensFollower judges the lens that OE mode was given.
 // Fixed memory; no allocation. One thread.
 
 #include <algorithm>
@@ -10,9 +10,9 @@
 namespace alidade {
 
 enum class ReadingBelief {
-  kBelieved,  // no landmarks lately, or none that speak against it
+  kBelieved,  // no landmarks lately, or none that contradict the reading
   kExcluded,  // the latest landmarks that held show another focal length
-  kJumped     // farther from what landmarks last showed than any lens can have moved since
+  kJumped     // farther from the lens that landmarks last showed than any lens can have moved since
 };
 
 struct ReadingBeliefOptions {
@@ -53,7 +53,7 @@ class ReadingJudge {
   [[nodiscard]] ReadingBelief belief(double age_s) const {
     return excluded_ && remembers(age_s) ? ReadingBelief::kExcluded : ReadingBelief::kBelieved;
   }
-  // The same if the reading's change of log f since then is known too, with its sigma.
+  // The same if also the change of the reading's log f since then is known, with its sigma.
   [[nodiscard]] ReadingBelief belief(double age_s, double change, double sigma) const {
     if (!remembers(age_s)) return ReadingBelief::kBelieved;
     if (excluded_) return ReadingBelief::kExcluded;

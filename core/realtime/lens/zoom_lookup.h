@@ -1,7 +1,8 @@
 #pragma once
-// ZoomLookup: the lens's zoom at any time, from its latest readings, and the zoom curve's
-// calibration for it. Between two readings the zoom is interpolated. Beyond the newest one a moving
-// lens is taken to go on at its rate; as it may have stopped, sigma includes half the way since.
+// ZoomLookup: the lens's zoom at any time, from the latest readings, and the zoom curve's
+// calibration at this zoom. Between two readings the zoom is interpolated. After the newest reading
+// a moving lens is taken to go on at its rate; as it may have stopped, sigma includes half of the
+// way since then.
 // Fixed memory; allocates nothing.
 
 #include <array>
@@ -21,9 +22,9 @@ class ZoomLookup {
   // tolerance.
   [[nodiscard]] bool stands_at(double zoom, double tolerance, double time_s) const;
 
-  // The relative change of focal length between the readings around the time and the one after
-  // them, by the curve. Needed as a lens that begins to move stays within the tolerance at first.
-  // 0: no change, or the curve does not say.
+  // The relative change of focal length, by the curve, between the readings around the time and the
+  // reading after them. Shows a lens that begins to move, as its first readings are still within
+  // the tolerance. 0: no change, or the curve does not reach the readings.
   [[nodiscard]] double change_about(const ZoomCurve& curve, double time_s) const;
 
   // The calibration for PT mode, for a frame with this telemetry time of its middle row, whose rows
@@ -67,7 +68,7 @@ inline constexpr double kSharpFocalLength = 0.01;
 // The same if the camera cannot calibrate itself. Beyond it the first landmarks do not hold through
 // a turn.
 inline constexpr double kRoughFocalLength = 0.05;
-// By this much of log f a lens may lie beyond the ends of the curve.
+// log f; so far a lens may lie beyond the ends of the curve.
 inline constexpr double kBeyondEnds = 0.02;
 // The curve's lens with this focal length, px, for a lens whose reading is wrong. `moves` is set.
 // Just beyond an end: the lens at that end. False: the curve does not reach it.

@@ -24,7 +24,8 @@ class ZoomReadings {
   [[nodiscard]] const std::optional<double>& told() const { return told_; }  // as last reported
   [[nodiscard]] const std::optional<double>& zoom() const { return zoom_; }  // without jitter
 
-  // Call when a calibration is adopted: one without a zoom counts as made at the present one.
+  // To be called when a calibration is adopted: if it has no zoom, it counts as made at the present
+  // zoom.
   void note_adoption() { zoom_at_adoption_ = zoom_; }
   // True if the present zoom is the calibration's, or one of the two is unknown.
   [[nodiscard]] bool fits(const std::optional<double>& calibrated) const;

@@ -4,10 +4,10 @@
 //   outer angle = telemetry's angle + z      z: telemetry's zero in the outer base
 //   outer angle = map angle + s              s: OE mode's map in the outer base
 //   z = s - o                                o: map_offset_filter.h's offset, not changed here
-// A measurement of a frame answered by landmarks gives s; one of a frame answered by telemetry
-// gives z. If the map begins anew, z remains. Before the first measurement z is exactly 0: the base
-// is telemetry's. Of two measurements, the one with the smaller covariance in the present view is
-// kept.
+// If landmarks answered the measured frame, the measurement gives s; if telemetry answered it, the
+// measurement gives z. If the map begins anew, z remains. Before the first measurement z is exactly
+// 0: the base is telemetry's. Of two measurements, the one with the smaller covariance in the
+// present view is kept.
 // Fixed memory; no allocation. One thread. Derivation: docs/derivations.md.
 
 #include "core/model/calibration.h"

@@ -2,8 +2,8 @@
 // CalibrationInUse: the calibration of OE mode while its focal length is learnt and its lens moves:
 //   given()      that of reset(), or of the zoom reading with which the map began
 //   of_frame()   with the lens of the last frame at phi = 0 (lens_scale.h). Before the lens moves:
-//                the given one, plus the part of phi that move() has put into it
-//   of_answer()  that lens as the last answer has it: at phi, with its covariance
+//                the given one, changed by the part of phi that move() has put into it
+//   of_answer()  with the same lens as the last answer has it: at phi, with its covariance
 // All three are the same unless the focal length is learnt. phi is MapOffsetFilter's: `scale`. A
 // moving lens, and the order of calls within a frame: lens_follower.h. Fixed memory; no allocation.
 // One thread.

@@ -5,7 +5,7 @@
 //   sum over patches of  | gain reference + offset - image(u + J_angle d) |^2
 // by Gauss-Newton, with a gain and offset for each patch. Patches whose own step disagrees with the
 // common one get less weight: they move by themselves or are hidden. Converges from within 1.5 px
-// of the coarsest octave. From farther away, the best of a grid of shifts is taken first.
+// of the coarsest octave. With a larger search_px, the best of a grid of shifts is taken first.
 // Pure functions; no allocation.
 
 #include "core/model/angle.h"

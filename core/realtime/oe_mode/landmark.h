@@ -10,9 +10,9 @@
 
 namespace alidade {
 
-// Its record over all frames in which landmarks held. A fine one is looked for when chosen, and
-// matched when an inlier (landmark_search.h). A coarse one is looked for when compared, and matched
-// when similar.
+// A landmark's record over all frames in which landmarks held. A fine landmark is looked for when
+// it is chosen, and matched when it is an inlier (landmark_search.h). A coarse one is looked for
+// when it is compared, and matched when it is similar.
 struct LandmarkStatistics {
   std::uint32_t looked_for = 0;  // frames
   std::uint32_t matched = 0;     // of these
@@ -28,9 +28,9 @@ struct Landmark {
   std::uint32_t id = 0;                          // never reused by one map
   std::uint8_t octave = 0;                       // of the pyramid, of its reference image
   Vector3<double> d = Vector3<double>::UnitX();  // unit, in the map's frame
-  // rad^2, of d in tangent_basis(d): its own part, independent of other landmarks.
+  // rad^2, of d in tangent_basis(d): the own part, independent of other landmarks.
   Matrix2<double> covariance = Matrix2<double>::Zero();
-  // rad^2, (pan, tilt) of the frame it was made in: shared by all landmarks made there.
+  // rad^2, (pan, tilt) of the frame in which it was made: common to all landmarks made there.
   Matrix2<double> shared_covariance = Matrix2<double>::Zero();
   // Of d in tangent_basis(d). All landmarks made with the calibration share its errors.
   LandmarkSensitivity sensitivity = LandmarkSensitivity::Zero();

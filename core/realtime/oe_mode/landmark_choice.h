@@ -1,11 +1,11 @@
 #pragma once
-// LandmarkChoice: selects the visible fine landmarks to look for in a frame. choose() is the only
-// place that decides it. What a change of it touches: docs/landmark_choice.md.
+// LandmarkChoice: selects the visible fine landmarks to look for in a frame. Nothing else decides
+// this. What a change of the choice touches: docs/landmark_choice.md.
 // If at most max_chosen fine landmarks are visible, all are chosen, in their order. Otherwise the
 // most reliable landmark of each of columns x rows parts of the image comes first, with a stride
-// between parts; the others follow in their order. The same inputs give the same choice, as it is
-// repeated within a frame. Reliability is the share of matches when looked for (rule of
-// succession), halved for each coarser octave, which has half the resolution.
+// between parts; the others follow in their order. The same inputs give the same choice, as the
+// choice is repeated within a frame. Reliability is the share of matches when looked for (rule of
+// succession), halved for each coarser octave, as its resolution is half.
 // The constructor takes all memory; nothing else allocates. One thread.
 
 #include <cstdint>

@@ -72,9 +72,9 @@ class LandmarkMap {
   [[nodiscard]] int find(const Vector3<double>& centre, double cosine_of_angle, int* slots,
                          int capacity) const;
 
-  // Usefulness, 0 to 1: high if found when looked for, and falling with the time since last looked
-  // for; more slowly if found often. A new landmark has 1/2 for 30 frames, so that other new ones
-  // do not replace it.
+  // Usefulness, 0 to 1: high if the landmark is found when looked for. It falls with the time since
+  // the last look, more slowly if the landmark was found often. A new landmark has 1/2 for 30
+  // frames, so that other new ones do not replace it.
   [[nodiscard]] double worth(int slot, std::uint32_t now) const;
 
  private:

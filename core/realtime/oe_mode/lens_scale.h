@@ -1,7 +1,7 @@
 #pragma once
 // LensScale: phi, the difference of log f from the map's calibration, as a lens does not return
-// exactly to its zoom curve (zoom_curve.h). It is learnt with the map's offset g, which telemetry
-// ties to it. Landmarks and motions are stored at phi = 0.
+// exactly to its zoom curve (zoom_curve.h). phi is learnt together with the map's offset g, as
+// telemetry correlates the two. Landmarks and motions are stored at phi = 0.
 //   the camera at phi: zoomed by phi (zoom_law.h); an exact distortion stays the same
 //   d / d phi = S a of all that has a Sensitivity S;  a: by_zoom() of the camera, 0 where exact
 // The calibration's error is a phi + e, e of covariance `others`. The noises of g, phi and

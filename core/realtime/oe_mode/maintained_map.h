@@ -4,7 +4,7 @@
 //   refine()           better directions, and less shear (map_upkeep.h, map_shear.h)
 //   judge_coarse()     coarse landmarks found or missed
 //   make()             landmarks where cells are empty (landmark_maker.h)
-//   retire_unproven()  handed-over ones that are not there
+//   retire_unproven()  removes handed-over landmarks that are not there
 // Every `calibration` is that of the landmarks; change_lens() announces another lens of it. The
 // constructor takes all memory; only state() allocates. One thread.
 
@@ -87,7 +87,8 @@ class MaintainedMap {
                                                       const ProcessedFrame& frame,
                                                       const LandmarkSearch& search,
                                                       bool lens_moves);
-  // Forgets landmarks that remain crooked. New ones will be as this frame's motion, now right.
+  // Forgets landmarks that remain crooked. New ones are made with this frame's motion, which is
+  // right now.
   void forget_crooked(const Calibration& calibration, const ProcessedFrame& frame);
   void judge_coarse(const Calibration& calibration, const ImageOctaves& image,
                     const ProcessedFrame& frame, const LandmarkSearch& search) {

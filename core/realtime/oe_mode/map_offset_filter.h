@@ -2,9 +2,9 @@
 // MapOffsetFilter: a Kalman filter of the map's offset (pan, tilt) against all telemetry, and the
 // frames that wait for telemetry.
 //   base angle = map angle + offset
-// A frame with extrapolated telemetry waits until telemetry encloses its time; only then is
-// anything learnt from it. Up to kMaxPending frames wait; beyond that the oldest is dropped.
-// What the same samples, landmarks or angles showed before counts less (variance_inflation(),
+// A frame with extrapolated telemetry waits until telemetry encloses its time; only then the filter
+// learns from it. Up to kMaxPending frames wait; of more, the oldest is dropped. A frame counts
+// less if the same samples, landmarks or angles were used before (variance_inflation(),
 // offset_cells.h). A learnt focal length joins the filter: (offset, phi), see lens_scale.h. An
 // innovation that contradicts offset and landmarks is rejected. Fixed memory; no allocation. One
 // thread. Derivation: docs/oe_mode.md.

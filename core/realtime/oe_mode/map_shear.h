@@ -1,12 +1,13 @@
 #pragma once
-// MapShear: how far all landmarks may be sheared together, and what neighbouring frames show of it.
-// The first frame's landmarks are placed with telemetry's rate, whose error times the row's time is
-// in their directions, and in those of all later landmarks. The angles of neighbouring frames
-// reveal it: derivatives of the curve through kCurve of them are compared, in its middle, with the
-// rate and acceleration that the map showed there, by a Kalman filter. Derivation: docs/oe_mode.md.
+// MapShear: how far all landmarks may be sheared together, and what neighbouring frames show of the
+// shear. The first frame's landmarks are placed with telemetry's rate; the rate's error times the
+// row's time is in their directions, and in those of all later landmarks. The angles of
+// neighbouring frames reveal this error: the derivatives in the middle of the curve through kCurve
+// angles are compared with the rate and acceleration that the map showed there, by a Kalman filter
+// (docs/oe_mode.md).
 // State of each axis: covariance of the errors of (angle, rate, acceleration) in a frame that looks
-// at tilt(), due to the shear. The angle's error counts from the map's beginning.
-// Fixed memory; no allocation. One thread.
+// at tilt(), due to the shear. The angle's error counts from the map's beginning. Fixed memory; no
+// allocation. One thread.
 
 #include <array>
 #include <cstddef>
@@ -34,9 +35,9 @@ struct MapShearOptions {
   [[nodiscard]] bool validate(const char** error = nullptr) const;
 };
 
-// Errors of the landmarks, as seen by a frame that looks at `tilt`: the excess of the rate and
-// acceleration it shows. A landmark's angle error is taken at the time of the row in which that
-// frame sees the landmark's elevation.
+// Errors of the landmarks, as a frame that looks at `tilt` sees them: the excess of the rate and
+// acceleration that this frame shows. A landmark's angle error is taken at the time of the row in
+// which this frame sees the landmark's elevation.
 struct ShearCorrection {
   Vector2<double> angle = Vector2<double>::Zero();         // rad, excess of the offset
   Vector2<double> rate = Vector2<double>::Zero();          // rad/s

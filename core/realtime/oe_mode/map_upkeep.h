@@ -1,9 +1,10 @@
 #pragma once
 // MapUpkeep: quality of the landmarks in the map: which are refined, which are retired, and whether
 // the map fits at all (PTCEE 36). landmark_maker.h makes new ones.
-// A landmark that held is refined (Kalman) in its own part of the covariance. One that is missed in
-// many frames in a row, or rarely found, is retired. A map that is contradicted or lost for many
-// frames in a row is useless. One that was handed over and is not found in view is doubted sooner.
+// A landmark that held is refined (Kalman) in its own part of the covariance. A landmark that is
+// missed in many frames in a row, or rarely found, is retired. A map that is contradicted or lost
+// for many frames in a row is useless. A handed-over map is doubted sooner, if its landmarks should
+// be in view and are not found.
 // No allocation. One thread.
 
 #include <vector>
@@ -59,9 +60,9 @@ class MapUpkeep {
   void judge_coarse(const Calibration& calibration, const Pyramid& pyramid,
                     const ProcessedFrame& frame, const LandmarkSearch& search,
                     LandmarkMap* map) const;
-  // True if any is unproven: handed over, and never looked for in a frame that held. If such
-  // landmarks should be in view and are not found, they are gone or were never there. One that was
-  // found here once may come back: fog lifts.
+  // True if a landmark is unproven: handed over, and never looked for in a frame that held. If
+  // unproven landmarks should be in view and are not found, they are gone or were never there. A
+  // landmark that was found here once may come back: fog lifts.
   [[nodiscard]] bool has_unproven(const std::vector<VisibleLandmark>& visible,
                                   const LandmarkMap& map) const;
   // Returns the number retired.

@@ -1,7 +1,7 @@
 #pragma once
-// MovingDirections: directions of what was seen to move (clouds, water, traffic), remembered for a
-// while. They go on as they were seen to move. No landmark is made there. Fixed memory: the oldest
-// is replaced. No allocation. One thread.
+// MovingDirections: directions in which something was seen to move (clouds, water, traffic),
+// remembered for kRemembered_s. Each direction goes on at the rate that was seen. No landmark is
+// made there. Fixed memory: the oldest is replaced. No allocation. One thread.
 
 #include <array>
 #include <cstddef>

@@ -157,8 +157,8 @@ class OeMode {
   [[nodiscard]] const BaseTie& tie() const { return tie_; }
   // Telemetry's zero in the base; 0 as long as nothing is known from outside.
   [[nodiscard]] TiedOffset telemetry_zero() const { return tie_.of_telemetry(offset_.offset()); }
-  // Converts telemetry's answer for any frame to the base. False if the result is not finite; *out
-  // is then unchanged.
+  // Converts *out, telemetry's answer for any frame, to the base. False if the result is not
+  // finite; *out is then unchanged.
   [[nodiscard]] bool put_into_base(FrameOrientation* out) const;
 
   // Of the last processed frame.

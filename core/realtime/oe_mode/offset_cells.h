@@ -3,10 +3,10 @@
 // part g of telemetry's error depends on the angle:
 //   y = offset + g(angle) + noise          g: variance A^2, correlation length L
 // Each cell of angle keeps the mean of its y's and their information I from noise. Noise averages
-// out within a cell, g does not: one cell's information on the offset is I / (1 + A^2 I), and that
-// of n independent lengths is at most n / A^2. What a neighbour said before counts less. Telemetry
-// states A and L, or they are learnt from cells that scatter by more than their noise. Fixed
-// memory; no allocation. One thread. Derivation: docs/oe_mode.md.
+// out within a cell, g does not: one cell's information on the offset is I / (1 + A^2 I), and the
+// information of n independent lengths is at most n / A^2. An angle counts less if a neighbouring
+// cell was seen before. Telemetry states A and L, or they are learnt from cells that scatter by
+// more than their noise. Fixed memory; no allocation. One thread. Derivation: docs/oe_mode.md.
 
 #include <array>
 #include <cstddef>

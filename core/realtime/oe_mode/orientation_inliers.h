@@ -1,9 +1,9 @@
 #pragma once
 // Which landmarks of a frame agree on a motion. Two steps:
 //   robust_start()   starts at the median of the angles that each landmark alone gives; then
-//                    weights fall with the residual, while the scale shrinks to what the residuals
-//                    show
-//   gate()           those within the gate count fully, the others not at all
+//                    weights fall with the residual, while the scale shrinks to that of the
+//                    residuals
+//   gate()           landmarks within the gate count fully, the others not at all
 // Internal to orientation_solve.cpp. No allocation.
 
 #include <array>

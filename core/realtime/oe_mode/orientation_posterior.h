@@ -1,7 +1,7 @@
 #pragma once
-// The last step of a frame's solution: all that is known together. Unknowns: the motion x, the
-// map's offset g and, if it is learnt, phi with the frame's own lens. Times are in units of half
-// the read-out. Internal to orientation_solve.cpp. No allocation.
+// The last step of a frame's solution: landmarks, telemetry and priors together. Unknowns: the
+// motion x, the map's offset g and, if the focal length is learnt, phi with the frame's own lens.
+// Times are in units of half the read-out. Internal to orientation_solve.cpp. No allocation.
 
 #include "core/realtime/oe_mode/orientation_without_angles.h"
 

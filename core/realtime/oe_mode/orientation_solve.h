@@ -122,11 +122,12 @@ struct SolveLimits {
 
 // width, height: px, of the image. half_readout_s: scale of the rows' times.
 // Robust: starts at the component-wise median of the landmarks' own angles. Weights fall with the
-// residual (Geman-McClure), and the scale shrinks to what the residuals show. Then those within the
-// gate count fully, the others not at all. Up to half of the landmarks may be wrong.
-// Covariance: that of the linear problem, times the factor by which squares of residuals exceed
-// their covariances, single or averaged over neighbours (within a tenth of the image's width),
-// which reveals common errors; plus the landmarks' shared covariance, averaged with their weights.
+// residual (Geman-McClure), and the scale shrinks to that of the residuals. Then landmarks within
+// the gate count fully, the others not at all. Up to half of the landmarks may be wrong.
+// Covariance: that of the linear problem, multiplied by the factor by which squares of residuals
+// exceed their covariances; residuals count single or averaged over neighbours (within a tenth of
+// the image's width), as averages reveal common errors. The landmarks' shared covariance, averaged
+// with their weights, is added.
 [[nodiscard]] SolveStatus solve_orientation(FoundLandmark* landmarks, int count,
                                             const MotionPrior& prior, const SolveLimits& limits,
                                             double width, double height, double half_readout_s,

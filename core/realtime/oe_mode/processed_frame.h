@@ -36,7 +36,7 @@ struct ProcessedFrame {
   FrameTelemetry telemetry = FrameTelemetry::kNone;
   double look_up_time_s = 0;  // s, telemetry clock; the time asked for
   double look_up_sigma_s = 0;
-  AngleError error;            // of that telemetry
+  AngleError error;            // of the telemetry looked up
   FrameMotion<double> motion;  // map's frame, about the middle row; with the solved zoom_rate
   Matrix6 covariance = Matrix6::Zero();  // of motion, from the frame's own noise
   Matrix2<double> shared_covariance =

@@ -1,13 +1,13 @@
 #pragma once
-// SceneDrift: does what the map's landmarks show stand still? Telemetry says over seconds what
-// ground is. Each landmark has a rate in the map's frame, from its places over some seconds, and
-// the map has one against telemetry, from its offsets. Rates are (pan, tilt) by which the camera
-// would have to turn for the same change in the picture, rad/s; landmark and map together are zero
-// for ground. Landmarks fall into one group, or into two of one rate each: clouds before a
-// mountain. Of two, telemetry says which is at rest; as long as it does not, nothing is claimed.
-// A group alone that is not at rest moves, if it does so steadily: play and sway are not steady,
-// and what goes with the angle is the gear's. Then a new map has to prove itself. The constructor
-// takes all memory; nothing else allocates, waits or throws. One thread.
+// SceneDrift: do the map's landmarks stand still? Over seconds telemetry shows which are ground.
+// Each landmark has a rate in the map's frame, from its places over some seconds, and the map has a
+// rate against telemetry, from its offsets. A rate is the (pan, tilt) rate by which the camera
+// would have to turn for the same change in the image, rad/s; for ground the sum of both rates is
+// zero. Landmarks form one group, or two groups of one rate each: clouds before a mountain. Of two
+// groups telemetry shows which is at rest; until then the verdict is kUndecided. A single group
+// that is not at rest moves, if its rate is steady: play and sway are not steady, and a rate that
+// follows the angle is the gear's. Then a new map has to prove itself. The constructor takes all
+// memory; nothing else allocates, waits or throws. One thread.
 
 #include <array>
 #include <cstddef>
@@ -22,8 +22,8 @@ namespace alidade {
 enum class SceneVerdict {
   kRest,       // as far as can be seen
   kUndecided,  // of two groups either may be at rest
-  kPartMoves,  // those landmarks that are apart
-  kMapMoves,   // the others, which the map follows
+  kPartMoves,  // the landmarks of the group apart, which the map does not follow
+  kMapMoves,   // the landmarks of the other group, which the map follows
   kAllMove
 };
 
@@ -75,7 +75,7 @@ class SceneDrift {
       if (moves) use(n.slot, n.id, n.d, n.apart ? apart_rate_ : rate_);
     }
   }
-  // What moves had its part in the map.
+  // Landmarks that moved had their part in the map.
   [[nodiscard]] bool has_bent_map() const { return bent_; }
 
   [[nodiscard]] std::size_t memory_bytes() const { return records_.capacity() * sizeof(Record); }

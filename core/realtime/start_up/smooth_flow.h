@@ -3,10 +3,10 @@
 // position in the image, fitted robustly. Units: px.
 //   moved(x, y) = sum over i + j <= 3 of c_ij x^i y^j,   (x, y) = (u - centre) / (width / 2)
 // A turning camera moves the image without parallax, and smoothly for any focal length, distortion
-// and rolling shutter (how well it fits: docs/derivations.md). Priors proportional to the motion
-// keep few or bunched samples from bending it. Outliers are down-weighted (Geman and McClure),
-// scaled by the median: up to a third of the image's middle may move by itself.
-// The constructor takes all memory; nothing else allocates, waits or throws.
+// and rolling shutter (how well the polynomial fits: docs/derivations.md). Priors proportional to
+// the motion prevent few or bunched samples from bending the polynomial. Outliers are down-weighted
+// (Geman and McClure), scaled by the median: up to a third of the image's middle may move by
+// itself. The constructor takes all memory; nothing else allocates, waits or throws.
 
 #include <Eigen/Core>
 #include <vector>
@@ -27,8 +27,8 @@ class SmoothFlow {
   void set_uniform(const Vector2<double>& moved);
 
   // Starts from the present flow, which must be right to a few times the samples' errors. Uses at
-  // most max_samples. Returns the standard deviation of the residuals per component, but at least
-  // `sigma`. With fewer than 4 samples the flow is unchanged and the result is infinity.
+  // most max_samples. Returns the standard deviation of the residuals per component (px), but at
+  // least `sigma`. With fewer than 4 samples the flow is unchanged and the result is infinity.
   double fit(const FlowSample* samples, int count, double sigma);
 
   [[nodiscard]] Vector2<double> at(const Vector2<double>& u) const;

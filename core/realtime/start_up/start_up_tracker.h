@@ -1,12 +1,12 @@
 #pragma once
 // StartUpTracker: keypoint tracks from the video of an uncalibrated camera, for the first
 // calibration (PTCEE section V-A). Uses no focal length, distortion, read-out, mount or telemetry,
-// so a wrong one cannot do harm.
-// An observation is where a landmark appears: px, as in CONVENTIONS.md, with the covariance that
-// differs between observations (docs/derivations.md). A point ends if it leaves the image or is not
-// found in two successive frames; later it is a new landmark. Shifts of up to a third of the image
-// between frames are followed; frames with nothing in common end all points.
-// The constructor takes all memory; nothing else allocates, waits or throws. One thread.
+// so a wrong value of these cannot do harm.
+// An observation is the place of a landmark in a frame: px, as in CONVENTIONS.md. Its covariance is
+// that of errors which differ between the observations of a landmark (docs/derivations.md). A point
+// ends if it leaves the image or is not found in two successive frames; later it is a new landmark.
+// Shifts of up to a third of the image between frames are followed; frames with nothing in common
+// end all points. Only the constructor allocates; nothing waits or throws after it. One thread.
 
 #include <array>
 #include <cstddef>
@@ -67,8 +67,8 @@ class StartUpTracker {
   //   small octave
   //   2 the motion of the points, coarse to fine, as one smooth function of the position
   //   (smooth_flow.h)
-  //   3 each point against its image in the frame where it was found, so that nothing drifts;
-  //   warped by the gradients of the motion since then (patch_alignment.h)
+  //   3 each point is aligned with its image in the frame where it was found, so that nothing
+  //   drifts; the image is warped by the gradients of the motion since then (patch_alignment.h)
   //   4 points that contradict the others' motion are rejected
   //   5 new points, FAST corners, where there are none
   // The image need not outlive the call.

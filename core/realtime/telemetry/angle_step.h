@@ -1,8 +1,9 @@
 #pragma once
 // AngleStep: finds the step of which all readings of a head are multiples, so that nobody has to
-// state it. Euclid's algorithm on the differences of successive readings: those of a continuous
-// angle soon have no common measure left. A head that turns evenly has equal differences without
-// any step, so only changes of the difference count. Plain values; no allocation. One thread.
+// state it. Euclid's algorithm on the differences of successive readings: the differences of a
+// continuous angle soon have no common measure left. A head that turns evenly has equal differences
+// without any step, so only changes of the difference count. Plain values; no allocation. One
+// thread.
 
 #include <algorithm>
 #include <cmath>

@@ -2,11 +2,11 @@
 // LinkDelay: how much later telemetry comes, against the pictures, than the calibration says.
 //   telemetry(t + delay) = image(t) + constant
 // image(t): the mount's angles as the images show them, from any zero; t contains the calibration's
-// clock offset. Each sample is compared with them at every delay of a grid within kRange_s; a delay
-// beyond that is not found. The sums of squares give the delay and its sigma once the mount has
-// accelerated, and then follow it. A delay that was believed is replaced only by one that explains
-// two stretches of motion in a row. Measured units, rad; s. Fixed memory, no allocation. One
-// thread. Derivation: docs/clocks.md.
+// clock offset. Each sample is compared with image(t) at every delay of a grid within kRange_s; a
+// larger delay is not found. Once the mount has accelerated, the sums of squares give the delay and
+// its sigma, and from then on follow the delay. A delay that was believed is replaced only by one
+// that explains two stretches of motion in a row. Measured units, rad; s. Fixed memory, no
+// allocation. One thread. Derivation: docs/clocks.md.
 
 #include <array>
 #include <cstddef>

@@ -4,8 +4,8 @@
 // Times are seconds of the telemetry clock: an image taken at image time t is looked up at t +
 // clock_offset. Angles are rad as measured, any turn. Differences go the short way round, so
 // neighbouring samples must be less than half a turn apart. Late samples are inserted in order. A
-// query beyond the samples extrapolates the nearest ones at constant rate for max_extrapolation_s,
-// with growing covariance, and is refused after that. Stale repeats: see repeat().
+// query up to max_extrapolation_s beyond the samples extrapolates the nearest ones at constant
+// rate, with growing covariance; a query farther beyond is refused. Stale repeats: see repeat().
 // Fixed memory, trivially copyable, no allocation. For one thread: the owner's.
 
 #include <algorithm>

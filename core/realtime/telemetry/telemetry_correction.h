@@ -1,7 +1,7 @@
 #pragma once
 // TelemetryCorrection: subtracts the known errors of telemetry's angles (telemetry_error.h) from
-// the samples before they are interpolated, and adds what remains to the covariance of interpolated
-// angles. phi is the true angle:
+// the samples before they are interpolated, and adds the variance of the remaining errors to the
+// covariance of interpolated angles. phi is the true angle:
 //   corrected = scale phi,   phi = play(m),   scale m + g(phi) = measured
 // Play has a state, so samples come in order of time. The state is unknown at first and after each
 // forget_state(). Fixed memory; no allocation. One thread.
@@ -25,7 +25,7 @@ class TelemetryCorrection {
   void correct(TelemetrySample* sample);
   // Samples were lost, or the head was switched off.
   void forget_state();
-  // Adds what remains of the error to the covariance.
+  // Adds the variance of the remaining error to the covariance.
   void add_left(InterpolatedPanTilt* measured) const;
 
  private:

@@ -45,8 +45,8 @@ struct InterpolatedPanTilt {
   PanTilt<double> rate;     // rad/s, measured units
   // Order: pan, tilt, pan rate, tilt rate.
   Matrix4<double> covariance = Matrix4<double>::Zero();
-  // rad^2 and rad: the part of `covariance` that is an error depending on the angle
-  // (telemetry_error.h), and its correlation length. 0: no such part is known.
+  // (pan, tilt): the part of `covariance` that comes from an error which depends on the angle
+  // (telemetry_error.h), rad^2, and its correlation length, rad. 0: no such part is known.
   Vector2<double> error_variance = Vector2<double>::Zero();
   Vector2<double> error_length = Vector2<double>::Zero();
   // (rad/s^2)^2, expected square of the acceleration (pan, tilt) near this time.
@@ -63,8 +63,9 @@ struct InterpolatedPanTilt {
 };
 
 // Expected acceleration of a mount that continues as before: the fourth root of the mean fourth
-// power of the last seconds' second differences, minus their noise. The fourth power, as a mount
-// that stops abruptly does so rarely and strongly. Knots are added from the newest to older ones.
+// power of the last seconds' second differences, minus their noise. The fourth power is used
+// because a mount that stops abruptly does so rarely and strongly. Knots are added from the newest
+// to older ones.
 class ExpectedAcceleration {
  public:
   static constexpr double kMemory = 5;  // s; older knots are not needed

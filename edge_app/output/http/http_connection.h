@@ -1,13 +1,13 @@
 #pragma once
-// HttpConnection: one client, from its first byte to the last byte that it takes. It goes through
-// these stages, with one operation and one deadline at a time:
+// HttpConnection: one client, from its first byte to the last byte that the client takes. The
+// connection goes through these stages, with one operation and one deadline at a time:
 //
 //   head --> gate --> body --> handler --> answer --> linger --> closed
 //
 // A refusal is an answer, too. An endless answer is asked for more whenever the client has taken
-// everything. All runs on the network thread, except the handler: it runs on a handlers' thread
-// while the connection does nothing else. An exception in a stage, as when memory has run out, ends
-// this connection and is passed on.
+// everything. All stages run on the network thread, except the handler: the handler runs on a
+// handlers' thread while the connection does nothing else. An exception in a stage, as when memory
+// has run out, ends this connection and is passed on.
 
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/steady_timer.hpp>
@@ -58,7 +58,7 @@ class HttpConnection final : public std::enable_shared_from_this<HttpConnection>
   HttpConnection(const HttpConnection&) = delete;
   HttpConnection& operator=(const HttpConnection&) = delete;
 
-  // Call once. From then on the connection keeps itself alive.
+  // To be called once. From then on the connection keeps itself alive, until it ends.
   void begin();
   // An endless answer may have more to send.
   void wake();
@@ -68,7 +68,7 @@ class HttpConnection final : public std::enable_shared_from_this<HttpConnection>
   [[nodiscard]] const HttpClient& client() const { return client_; }
   // Calls the handler; on a handlers' thread.
   void work() noexcept;
-  // Call after work(), on the network thread.
+  // To be called after work(), on the network thread.
   void take_answer();
 
  private:

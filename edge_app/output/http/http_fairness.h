@@ -16,9 +16,9 @@ using HttpAddress = boost::asio::ip::address_v6;
 [[nodiscard]] HttpAddress http_address(const boost::asio::ip::address& peer);
 
 // Limits the requests a second of all addresses together. Each address that asked within the last
-// second has the same share: at most the share of one second at once, and at least one request. An
-// address may use more while others leave more than half of a second's requests. Beyond
-// kMaxAddresses, all further addresses have one share together.
+// second has the same share. At once an address may use its share of one second, or one request if
+// the share is less. An address may use more while others leave more than half of a second's
+// requests. Beyond kMaxAddresses, all further addresses have one share together.
 class FairRate {
  public:
   explicit FairRate(double per_s);
@@ -41,8 +41,8 @@ class FairRate {
   std::map<HttpAddress, Account> accounts_;
 };
 
-// The addresses that did something within the last ten minutes. At most kMost; then the one whose
-// action is longest ago is forgotten.
+// The addresses that did something within the last ten minutes, at most kMost. Beyond kMost the
+// address whose action is longest ago is forgotten.
 class RecentAddresses {
  public:
   void add(const HttpAddress& address, double now_s);
@@ -67,8 +67,8 @@ class FairPlaces {
 
   [[nodiscard]] bool full() const { return places_.size() >= most_; }
 
-  // The oldest place of the address that holds the most. If several addresses hold equally many,
-  // the oldest place of all of these. Null: there are no places taken.
+  // The holder of the oldest place of the address that holds the most places. If several addresses
+  // hold equally many, the oldest place of all of them. Null: no place is taken.
   [[nodiscard]] Holder* oldest_of_the_greediest() const {
     const std::size_t most = largest_share();
     const auto found = std::find_if(places_.begin(), places_.end(), [&](const Place& place) {
@@ -77,9 +77,9 @@ class FairPlaces {
     return found == places_.end() ? nullptr : found->holder;
   }
 
-  // The place that may be taken away for the newcomer: the newest of the address that holds the
-  // most, if that holds at least two more than the newcomer's address. So nobody ends with fewer
-  // places than the newcomer. Null: there is none.
+  // The holder of the place that may be taken away for the newcomer: the newest place of the
+  // address that holds the most, if that address holds at least two more than the newcomer's. So
+  // nobody ends with fewer places than the newcomer. Null: there is none.
   [[nodiscard]] Holder* one_too_many(const HttpAddress& newcomer) const {
     const std::size_t most = largest_share();
     if (most < held_by(newcomer) + 2) return nullptr;

@@ -1,6 +1,6 @@
 #pragma once
-// HttpGate: who may ask what. It decides everything that follows from a request's head, before the
-// body is read.
+// HttpGate: who may ask what. The gate decides everything that follows from a request's head,
+// before the body is read.
 
 #include <atomic>
 #include <cstddef>
@@ -70,14 +70,14 @@ class HttpGate {
   // Any thread.
   [[nodiscard]] HttpTickets& tickets() { return tickets_; }
 
-  // Network thread. Whether a client may begin a TLS handshake: whether its address has some of its
+  // Network thread. Whether a client may begin a TLS handshake: true if its address has some of its
   // share left. Addresses that showed a token lately have shares of their own. Refusals are
-  // counted.
+  // counted. now_s: s, monotonic, as in all functions here.
   [[nodiscard]] bool may_shake_hands(const HttpAddress& address, double now_s);
 
   // Network thread. Returns the route that answers; null: *refusal is the answer. Sets token and
-  // right of *client. A request whose body is still to come is not counted yet; call charge() when
-  // it has come.
+  // right of *client. A request whose body is still to come is not counted yet; charge() is to be
+  // called when the body has come.
   [[nodiscard]] const HttpRoute* admit(const HttpHead& head, double now_s, bool body_to_come,
                                        HttpClient* client, ServerResponse* refusal);
   // Counts a request. False: the client's share is used up, *refusal is the answer.

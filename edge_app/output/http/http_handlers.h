@@ -30,7 +30,7 @@ class HttpHandlers {
   // Continues the connections whose requests were answered.
   void collect();
 
-  // Call it on kThreads threads; returns after stop().
+  // To be called on kThreads threads; returns after stop().
   void serve();
   void stop();
   // Only when no thread serves any more.

@@ -1,5 +1,6 @@
 #pragma once
-// HttpHead: the head of a request, as far as it matters here. Pure: bytes in, value or refusal out.
+// HttpHead: the parts of a request's head that this server uses. Pure: bytes in, value or refusal
+// out.
 
 #include <optional>
 #include <string>
@@ -29,7 +30,7 @@ struct HttpHead {
 // text: everything up to and including the blank line. False: *refusal is the answer.
 [[nodiscard]] bool parse_http_head(std::string_view text, HttpHead* head, ServerResponse* refusal);
 
-// The length of the body that the head states, at most max_body bytes. False: *refusal is the
+// The length of the body that the head states, in bytes, at most max_body. False: *refusal is the
 // answer.
 [[nodiscard]] bool body_length(const HttpHead& head, std::size_t max_body, std::size_t* length,
                                ServerResponse* refusal);

@@ -1,6 +1,7 @@
 #pragma once
 // HttpListener: accepts clients, runs their connections and wakes endless answers. If memory or
-// descriptors run out, clients are lost; it accepts clients again as soon as there are some.
+// descriptors run out, clients are lost; the listener accepts clients again as soon as there is
+// memory and a descriptor.
 //
 // One thread runs serve_network(): all sockets and all deadlines. HttpHandlers::kThreads threads
 // run serve_handlers().
@@ -22,7 +23,7 @@ namespace alidade {
 
 class HttpListener {
  public:
-  // All of them must outlive this object.
+  // options, *gate and *tally must outlive this object.
   HttpListener(const HttpServerOptions& options, HttpGate* gate, HttpTally* tally);
   ~HttpListener();
   HttpListener(const HttpListener&) = delete;

@@ -21,13 +21,13 @@ struct ServerRequest {
   [[nodiscard]] std::optional<std::string> parameter(const std::string& name) const;
 };
 
-// An endless answer. It ends when its client or the server ends.
+// An endless answer: it lasts until its client or the server ends.
 class HttpStream {
  public:
   virtual ~HttpStream() = default;
-  // Appends what there is to send. Called on the network thread whenever the client has taken
-  // everything before; must not wait. If it appends nothing, it is called again after
-  // HttpServer::wake(), at the latest after half a second.
+  // Appends to *piece what there is to send. Called on the network thread whenever the client has
+  // taken everything before; must not wait. After a call that appends nothing, the next call comes
+  // after HttpServer::wake(), at the latest after half a second.
   virtual void next(std::string* piece) = 0;
 };
 

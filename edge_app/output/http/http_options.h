@@ -12,16 +12,16 @@
 namespace alidade {
 
 struct HttpLimits {
-  // Connections at the same time. One more takes the place of the oldest connection of the address
-  // that holds most.
+  // Connections at the same time. A further one takes the place of the oldest connection of the
+  // address that holds most.
   int max_strangers = 128;  // connections that showed no token; all of them if no token is set
   int max_with_token = 64;
-  // Endless answers at the same time. One more gets 503, unless another address holds at least two
-  // more than the client's: then that address loses one.
+  // Endless answers at the same time. A further one gets 503. But if another address holds at least
+  // two more than the client's, that other address loses its newest and the client is served.
   int max_streams = 32;
   std::size_t max_head_bytes = 8192;
   double head_timeout_s = 5;    // from the connection to the last byte of the head
-  double body_timeout_s = 10;   // from there to the last byte of the body
+  double body_timeout_s = 10;   // from the last byte of the head to that of the body
   double write_timeout_s = 10;  // without a byte taken by the client
   // For all strangers together, and the same for all with a token; shared by their addresses.
   double requests_per_s = 500;
@@ -37,7 +37,7 @@ struct HttpToken {
   HttpRight right = HttpRight::kControl;
 };
 
-// PEM files. They are read again when they change.
+// Paths of PEM files. The files are read again when they change.
 struct HttpTlsOptions {
   std::string certificate;  // the server's first, then the intermediate ones
   std::string key;
@@ -48,8 +48,8 @@ struct HttpServerOptions {
   int port = 0;                   // 0: any free port
   std::string token;              // may do everything
   std::vector<HttpToken> tokens;  // further tokens; if `token` is empty, too, none is needed
-  // The file of the tokens, which is read again when it changes; empty: they stay. See
-  // http_tokens.h.
+  // Path of the tokens' file, which is read again when it changes (http_tokens.h). Empty: the
+  // tokens above stay.
   std::string token_file;
   bool token_file_holds_several = false;
   FileStamp token_file_stamp;

@@ -32,11 +32,11 @@ class HttpServer {
   // For routes of HttpAccess::kStream. Any thread.
   [[nodiscard]] HttpTickets& tickets() { return gate_.tickets(); }
 
-  // Call before start(). True if certificate and key can be used, or none are configured. False
-  // with one line in *error.
+  // To be called before start(). True if certificate and key can be used, or none are configured.
+  // False with one line in *error.
   [[nodiscard]] bool check_tls(std::string* error) const;
-  // Binds and listens; call once. False with one line in *error, or with none if `wait` gave up.
-  // A host that is an address is not waited for.
+  // Binds and listens; to be called once. False with one line in *error, or with an empty *error if
+  // `wait` gave up. `wait` is not called for a host that is an address.
   [[nodiscard]] bool start(const HttpStartWait& wait, std::string* error);
   // The same with a wait that never gives up.
   [[nodiscard]] bool start(std::string* error);

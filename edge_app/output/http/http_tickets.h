@@ -16,9 +16,9 @@ class HttpTickets {
   static constexpr double kValidS = 10;
   static constexpr std::size_t kMost = 1024;  // beyond that the oldest is forgotten
 
-  // Empty: the system has no random bits.
+  // A new ticket. now_s: s, monotonic. Empty: the system has no random bits.
   [[nodiscard]] std::optional<std::string> issue(double now_s);
-  // Whether it was issued, is still valid and was not used before.
+  // Whether the ticket was issued, is still valid and was not used before. Uses it up.
   [[nodiscard]] bool take(const std::string& ticket, double now_s);
 
  private:

@@ -1,7 +1,8 @@
 #pragma once
 // HttpTls: certificate and key of a server. They are read again when their files change, so that
-// they can be renewed without a restart. If the new files cannot be used, the old ones stay, and
-// that is logged once. A failure counts only if it lasts, as one file is replaced before the other.
+// they can be renewed without a restart. If the new files cannot be used, the old certificate and
+// key stay, and the failure is logged once. A failure counts only if it lasts, as one file is
+// replaced before the other.
 //
 // TLS 1.2 and later; no renegotiation, no compression, no session cache. For the network thread,
 // except load().

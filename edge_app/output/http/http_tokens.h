@@ -1,7 +1,7 @@
 #pragma once
 // HttpTokens: the tokens of a server and what each may do. They come from the configuration, or
 // from a file that is read again when it changes, so that tokens can be replaced without a restart.
-// If the new file cannot be used, the old tokens stay, and that is logged once.
+// If the new file cannot be used, the old tokens stay, and the failure is logged once.
 //
 //   one token       the first line of the file; it may do everything
 //   several         one a line, `view TOKEN` or `control TOKEN`; empty lines and lines that begin

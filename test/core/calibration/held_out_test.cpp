@@ -2,14 +2,22 @@
 
 #include "core/calibration/held_out.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <optional>
 
 #include "test/support/simulated_recording.h"
 
 namespace alidade {
 namespace {
+
+using ::testing::AllOf;
+using ::testing::DoubleNear;
+using ::testing::Gt;
+using ::testing::Lt;
+using ::testing::Optional;
 
 // A calibration of nine frames of ten, and the observations of the tenth.
 class HeldOutTest : public ::testing::Test {
@@ -56,36 +64,36 @@ FrameTimes HeldOutTest::times_;
 TEST_F(HeldOutTest, IsOneWhereTheSigmasAreRight) {
   ASSERT_TRUE(result_->ok());
   ASSERT_GT(held_out_.size(), 500U);
-  EXPECT_NEAR(held_out_error(held_out_, times_, *result_), 1, 0.1);
+  EXPECT_THAT(held_out_error(held_out_, times_, *result_), Optional(DoubleNear(1, 0.1)));
 }
 
 TEST_F(HeldOutTest, CountsInStatedSigmas) {
   // The landmarks' own covariance does not shrink with the observations' sigmas.
-  const double third = held_out_error(with_sigmas(1.0 / 3), times_, *result_);
-  EXPECT_GT(third, 2);
-  EXPECT_LT(third, 3.3);
-  EXPECT_NEAR(held_out_error(with_sigmas(100), times_, *result_), 0.01, 0.001);
+  EXPECT_THAT(held_out_error(with_sigmas(1.0 / 3), times_, *result_),
+              Optional(AllOf(Gt(2), Lt(3.3))));
+  EXPECT_THAT(held_out_error(with_sigmas(100), times_, *result_),
+              Optional(DoubleNear(0.01, 0.001)));
 }
 
 TEST_F(HeldOutTest, AFifthOfOutliersHardlyMovesIt) {
   std::vector<CalibrationObservation> observations = held_out_;
   for (std::size_t i = 0; i < observations.size(); i += 5) observations[i].u_px += 100;
-  EXPECT_LT(held_out_error(observations, times_, *result_), 1.35);
+  EXPECT_THAT(held_out_error(observations, times_, *result_), Optional(Lt(1.35)));
 }
 
 TEST_F(HeldOutTest, SeesAFrameAtAWrongTime) {
   FrameTimes late = times_;
   // 10 ms of a path that turns a field of view in seconds: many px.
   for (auto& [frame, time_s] : late) time_s += 0.01;
-  EXPECT_GT(held_out_error(held_out_, late, *result_), 10);
+  EXPECT_THAT(held_out_error(held_out_, late, *result_), Optional(Gt(10)));
 }
 
 TEST_F(HeldOutTest, IsNothingWithoutATimeOrALandmark) {
-  EXPECT_EQ(held_out_error({}, times_, *result_), 0);
-  EXPECT_EQ(held_out_error(held_out_, {}, *result_), 0);
+  EXPECT_EQ(held_out_error({}, times_, *result_), std::nullopt);
+  EXPECT_EQ(held_out_error(held_out_, {}, *result_), std::nullopt);
   std::vector<CalibrationObservation> unknown = held_out_;
   for (CalibrationObservation& seen : unknown) seen.landmark += 1000000;
-  EXPECT_EQ(held_out_error(unknown, times_, *result_), 0);
+  EXPECT_EQ(held_out_error(unknown, times_, *result_), std::nullopt);
 }
 
 }  // namespace

@@ -8,16 +8,21 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 
 #include "test/support/simulated_recording.h"
 
 namespace alidade {
 namespace {
 
+using ::testing::Gt;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Lt;
+using ::testing::Optional;
 
-// held_out_factor: of the sigmas that the tracker states in the frames that are held out.
+// held_out_factor: of the sigmas that the tracker states in the frames that are held out; 0: it
+// finds nothing there.
 // polled_width_s: of the interval in which each angle was asked for; 0: numbered by the device.
 CalibrationSession session_of(const test::Simulation& s, double held_out_factor,
                               double polled_width_s = 0) {
@@ -46,7 +51,7 @@ CalibrationSession session_of(const test::Simulation& s, double held_out_factor,
     tracks.stamp.sequence = frame.sequence;
     const bool held_out = CalibrationSession::is_held_out(place++);
     for (TrackedPoint point : points[frame.frame]) {
-      if (tracks.count == kMaxFramePoints) break;
+      if (tracks.count == kMaxFramePoints || (held_out && held_out_factor == 0)) break;
       if (held_out) point.sigma_px *= static_cast<float>(held_out_factor);
       tracks.points[static_cast<std::size_t>(tracks.count++)] = point;
     }
@@ -72,7 +77,8 @@ CheckedCalibration calibrated(double held_out_factor, const Calibration* known =
 }
 
 double excess_of(const CheckedCalibration& checked) {
-  return std::max(1.0, checked.hold_out / std::max(1.0, checked.result.quality.pixel_sigma_ratio));
+  const double unit = std::max(1.0, checked.result.quality.pixel_sigma_ratio);
+  return std::max(1.0, checked.hold_out.value_or(0) / unit);
 }
 
 // The sigmas of frames that the adjustment does not see cannot change it: only what these frames say does.
@@ -95,7 +101,7 @@ TEST(CheckedCalibration, SigmasGrowAsMuchAsHeldOutFramesLieFartherOffThanTheyCla
 TEST(CheckedCalibration, SigmasDoNotShrinkWhereHeldOutFramesFitBetterThanTheyClaim) {
   const CheckedCalibration honest = calibrated(1);
   const CheckedCalibration modest = calibrated(3);
-  ASSERT_LT(modest.hold_out, 0.5);
+  ASSERT_THAT(modest.hold_out, Optional(Lt(0.5)));
   EXPECT_LE(modest.result.calibration.covariance(0, 0), honest.result.calibration.covariance(0, 0));
   EXPECT_NEAR(modest.result.calibration.covariance(0, 0) * excess_of(honest) * excess_of(honest),
               honest.result.calibration.covariance(0, 0),
@@ -105,8 +111,15 @@ TEST(CheckedCalibration, SigmasDoNotShrinkWhereHeldOutFramesFitBetterThanTheyCla
 TEST(CheckedCalibration, IsRefusedWhereHeldOutFramesContradictIt) {
   const CheckedCalibration off = calibrated(0.2);
   EXPECT_TRUE(off.result.ok());
-  EXPECT_GT(off.hold_out, 2);
+  EXPECT_THAT(off.hold_out, Optional(Gt(2)));
   EXPECT_THAT(off.refusal, HasSubstr("held out"));
+}
+
+TEST(CheckedCalibration, IsRefusedWhereNothingWasSeenInHeldOutFrames) {
+  const CheckedCalibration untold = calibrated(0);
+  EXPECT_TRUE(untold.result.ok());
+  EXPECT_EQ(untold.hold_out, std::nullopt);
+  EXPECT_THAT(untold.refusal, HasSubstr("held out"));
 }
 
 TEST(CheckedCalibration, WhatIsKnownMakesItSharper) {
