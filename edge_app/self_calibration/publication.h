@@ -4,6 +4,7 @@
 // thread.
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -52,8 +53,11 @@ class Publication {
   [[nodiscard]] bool is_fresh_wanted() const { return is_fresh_wanted_; }
   void want_fresh(bool wanted) { is_fresh_wanted_ = wanted; }
 
-  [[nodiscard]] bool is_rejected(double zoom) const {
-    return std::find(rejected_.begin(), rejected_.end(), zoom) != rejected_.end();
+  // tolerance: device units; readings within it are one zoom.
+  [[nodiscard]] bool is_rejected(double zoom, double tolerance) const {
+    return std::any_of(rejected_.begin(), rejected_.end(), [zoom, tolerance](double rejected) {
+      return std::abs(zoom - rejected) <= tolerance;
+    });
   }
   // Calibrations of the zooms for which `fits` is true are no longer rejected.
   template <class Fits>
