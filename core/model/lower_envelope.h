@@ -35,6 +35,7 @@ class LowerEnvelope {
     scale_ = options_.expected_jitter_s;
     line_ = {0, 0, prior.rate, scale_ * scale_, 0, prior.half_range * prior.half_range / 3};
     slots_ = 0;
+    items_ = 0;
     held_from_ = kNever;
     slot_width_ = 0;  // at first each item has its own slot
     locked_ = false;
@@ -52,6 +53,11 @@ class LowerEnvelope {
   void release() { held_from_ = kNever; }
 
   [[nodiscard]] const LineEstimate& line() const { return line_; }
+  // s; of the items' delays, by those near the least one: their density there is 1 / scale. That is
+  // the mean of exponential delays, and more where few are that short, as behind a relay.
+  [[nodiscard]] double delay_scale_s() const {
+    return slots_ > 0 ? scale_ * std::max(1.0, items_ / static_cast<double>(slots_)) : scale_;
+  }
   // s; host time that the slots span.
   [[nodiscard]] double memory_s() const {
     return slots_ > 0 ? (x_[slots_ - 1] - x_[0]) * line_.slope : 0.0;
@@ -59,6 +65,7 @@ class LowerEnvelope {
 
   // x must be beyond all earlier ones. The item counts if it is the lowest of its slot.
   void insert(double receive_s, double x, double y) {
+    items_ += 1;
     if (slots_ > 0 && receive_s - slot_since_ < slot_width_) {
       const std::size_t last = slots_ - 1;
       if (y - y_[last] >= line_.slope * (x - x_[last])) {
@@ -127,6 +134,7 @@ class LowerEnvelope {
       std::copy(x_.begin() + 1, x_.end(), x_.begin());
       std::copy(y_.begin() + 1, y_.end(), y_.begin());
       --slots_;
+      items_ *= 1 - 1.0 / Capacity;
       return;
     }
     for (std::size_t i = 0; i < Capacity / 2; ++i) {
@@ -173,6 +181,7 @@ class LowerEnvelope {
   std::array<double, Capacity> x_{};
   std::array<double, Capacity> y_{};
   std::size_t slots_ = 0;
+  double items_ = 0;       // in the slots, about
   double slot_width_ = 0;  // s
   double slot_since_ = 0;  // s; receive time at which the youngest slot began
   double scale_ = 0;       // s; of the slots' residuals

@@ -150,7 +150,7 @@ inline LineEstimate fit_lower_line(const double* x, const double* y, std::size_t
 }
 
 // Scale of the delays, from their residuals above the lowest point along a fitted line. Uses a low
-// quantile, rank n / 8 but at least min(n / 2, 16): the density next to the minimum counts, heavy
+// quantile, rank n / 8 but at least min(n / 2, 8): the density next to the minimum counts, heavy
 // tails do not. least: the result is at least this, > 0. guess: of the scale; it weighs as much as
 // two points. residual: room for n values.
 inline double delay_scale(const double* x, const double* y, std::size_t n, const LineEstimate& line,
@@ -162,7 +162,7 @@ inline double delay_scale(const double* x, const double* y, std::size_t n, const
   for (std::size_t i = 0; i < n; ++i) {
     residual[i] = y[i] - line.value_at(x[i]);
   }
-  const std::size_t rank = std::max(n / 8, std::min<std::size_t>(n / 2, 16));
+  const std::size_t rank = std::max(n / 8, std::min<std::size_t>(n / 2, 8));
   std::nth_element(residual, residual + rank, residual + n);
   const double lowest = *std::min_element(residual, residual + rank);
   const double count = static_cast<double>(n);

@@ -40,12 +40,14 @@ class MinimumDelayStep {
   }
 
   // The step, if a run has lasted until this receive time and shows one. Both runs then begin anew.
-  // To be called before the item is added to a run. rate_sigma: of the line's rate (host seconds
-  // per host second); the halves of a run may differ by it.
-  std::optional<DelayStep> judge(double receive_s, double rate_sigma = 0) {
+  // To be called before the item is added to a run. usual_delay_s: mean of the usual delays above the
+  // line, as those near it have it; a run's own counts if it is larger. rate_sigma: of the line's
+  // rate (host seconds per host second); the halves may differ by it.
+  std::optional<DelayStep> judge(double receive_s, double usual_delay_s = 0,
+                                 double rate_sigma = 0) {
     const double drift_s = kReach * rate_sigma * settle_s_ / 2;
-    const std::optional<DelayStep> fall = judge(&early_, true, receive_s, drift_s);
-    return fall ? fall : judge(&late_, false, receive_s, drift_s);
+    const std::optional<DelayStep> fall = judge(&early_, true, receive_s, usual_delay_s, drift_s);
+    return fall ? fall : judge(&late_, false, receive_s, usual_delay_s, drift_s);
   }
 
   void add_late(double receive_s, double residual_s) { late_.add(receive_s, residual_s, false); }
@@ -131,7 +133,7 @@ class MinimumDelayStep {
     [[nodiscard]] double spread() const { return (sum / items - younger) / items; }
   };
 
-  std::optional<DelayStep> judge(Run* run, bool falls, double receive, double drift) {
+  std::optional<DelayStep> judge(Run* run, bool falls, double receive, double usual, double drift) {
     if (!run->active || receive - run->middle < settle_s_ / 2) {
       return std::nullopt;
     }
@@ -139,7 +141,7 @@ class MinimumDelayStep {
       *run = {};  // a stray outlier
       return std::nullopt;
     }
-    const double spread = std::max(run->spread(), resolution_s_);
+    const double spread = std::max({run->spread(), usual / run->items, resolution_s_});
     const double step = std::min(run->older, run->younger);
     if (run->middle == run->since || run->items < kLeastItems ||
         std::abs(run->older - run->younger) > kSameMinimum * spread + drift ||

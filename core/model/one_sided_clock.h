@@ -66,7 +66,7 @@ class OneSidedClock {
     }
     const bool held = steps_.suspects_rise() && on_line_ >= kLeastOnLine;
     const double rate_sigma = held ? std::sqrt(line().var_slope) / line().slope : 0;
-    if (const std::optional<DelayStep> step = steps_.judge(receive, rate_sigma)) {
+    if (const std::optional<DelayStep> step = steps_.judge(receive, usual_delay_s_, rate_sigma)) {
       envelope_.release();
       if (step->step_s < 0 || on_line_ >= kLeastOnLine) {
         subtract(*step, item.sigma_s);
@@ -82,7 +82,7 @@ class OneSidedClock {
       steps_.add_late(receive, residual);
       steps_.suspect(receive, residual, usual_delay_s_);
     } else {
-      usual_delay_s_ = delay_s_;
+      usual_delay_s_ = std::max(delay_s_, envelope_.delay_scale_s());
       sigma_on_line_s_ = item.sigma_s;
     }
     if (steps_.suspects_rise() && on_line_ >= kLeastOnLine) {
@@ -149,7 +149,7 @@ class OneSidedClock {
   double anchor_receive_s_ = 0;
   double delay_s_ = 0;
   // As of the last item that came down to the line:
-  double usual_delay_s_ = 0;    // delay_s_
+  double usual_delay_s_ = 0;    // delay_s_, or more if few delays come near the least one
   double sigma_on_line_s_ = 0;  // of the line
   bool locked_ = false;
   double on_line_ = 0;        // items that came down to the line since an early one dragged it

@@ -4,6 +4,7 @@
 // wanted. begin_with() comes first. Allocates. One thread.
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -52,9 +53,12 @@ class Publication {
   [[nodiscard]] bool is_fresh_wanted() const { return is_fresh_wanted_; }
   void want_fresh(bool wanted) { is_fresh_wanted_ = wanted; }
 
-  // Whether the stored calibration of this zoom (device units) was withdrawn.
-  [[nodiscard]] bool is_rejected(double zoom) const {
-    return std::find(rejected_.begin(), rejected_.end(), zoom) != rejected_.end();
+  // Whether the stored calibration of this zoom (device units) was withdrawn. tolerance: device
+  // units; readings within it are one zoom.
+  [[nodiscard]] bool is_rejected(double zoom, double tolerance) const {
+    return std::any_of(rejected_.begin(), rejected_.end(), [zoom, tolerance](double rejected) {
+      return std::abs(zoom - rejected) <= tolerance;
+    });
   }
   // Calibrations of the zooms for which `fits` is true are no longer rejected.
   template <class Fits>

@@ -117,7 +117,7 @@ void SelfCalibration::look_for_stored() {
   } else {
     return;
   }
-  if (publication_.is_rejected(*found->calibration.zoom)) return;
+  if (publication_.is_rejected(*found->calibration.zoom, zoom_.tolerance())) return;
   found->telemetry_error = stored != nullptr && stored->notes.telemetry_error.exists()
                                ? stored->notes.telemetry_error
                                : publication_.object()->telemetry_error;

@@ -22,6 +22,7 @@ CLOCK_OFFSET_MS = -84.4
 FOUND_WITHIN_S = 4  # of the first record with an orientation; the camera moves all the time, but now and then steadily
 RELAY_S = 40  # of a first calibration and what comes after it
 MOST_BEYOND = 1e-4  # share of the records beyond 5 sigma
+SEEDS = range(1, 11)
 SETTINGS = {
     "image": {"width": WIDTH, "height": HEIGHT, "rate_hz": RATE_HZ},
     "camera": {"focal_length_px": FOCAL_LENGTH_PX, "radial_distortion": 55.4, "line_delay_us": -64.0,
@@ -109,7 +110,7 @@ class LinkDelaySeeds(LinkDelayTest):
         worst = {}
         found_s = []
         beyond = count = 0
-        for seed in range(1, 11):
+        for seed in SEEDS:
             camera = self.camera(seed=seed, settings=SETTINGS)
             for slower_ms in (-300, -85, -20, 20, 85, 300):
                 for mode in ("OE", "PT"):
@@ -129,7 +130,7 @@ class LinkDelaySeeds(LinkDelayTest):
 class RelaySeeds(LinkDelayTest):
     def test_a_first_calibration_behind_a_relay_that_delays_by_up_to_80_ms(self):
         beyond = count = 0
-        for seed in range(1, 11):
+        for seed in SEEDS:
             with self.subTest(seed=seed):
                 camera = self.camera(seed=seed, settings=SETTINGS)
                 url = urllib.parse.urlsplit(camera.video_url)

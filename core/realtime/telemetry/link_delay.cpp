@@ -141,9 +141,13 @@ void LinkDelay::compare(const TelemetrySample& sample) {
     if (s.samples == 0) s.reference = measured[axis] - shown[kCentre];
     for (std::size_t k = 0; k < kCandidates; ++k) {
       const double residual = wrap_angle(measured[axis] - s.reference - shown[k]);
-      s.first[k] += residual;
+      s.sum[k] += residual;
       s.squares[k] += residual * residual;
-      if (s.samples > 0) s.lagged[k] += residual * s.before[k];
+      if (s.samples > 0) {
+        s.lagged[k] += residual * s.before[k];
+      } else {
+        s.begin[k] = residual;
+      }
       s.before[k] = residual;
     }
     double square = 0;
@@ -161,9 +165,11 @@ void LinkDelay::add_stretch(const Stretch& stretch, Sums* sums) {
   if (stretch.samples < 2) return;
   const double n = stretch.samples;
   for (std::size_t k = 0; k < kCandidates; ++k) {
-    const double square = stretch.first[k] * stretch.first[k];
-    sums->squares[k] += std::max(0.0, stretch.squares[k] - square / n);
-    sums->lagged[k] += stretch.lagged[k] - square * (n - 1) / (n * n);
+    const double mean = stretch.sum[k] / n;
+    sums->squares[k] += std::max(0.0, stretch.squares[k] - n * mean * mean);
+    // Of r_i - mean: each residual is in two products, but for the first and the last.
+    sums->lagged[k] +=
+        stretch.lagged[k] - mean * ((n + 1) * mean - stretch.begin[k] - stretch.before[k]);
   }
   sums->degrees += n - 1;
   sums->square_rate += stretch.square_rate;

@@ -90,10 +90,11 @@ class LinkDelay {
   };
   // The stretch of motion that is being summed.
   struct Stretch {
-    std::array<double, kCandidates> first{};  // sum
+    std::array<double, kCandidates> sum{};
     std::array<double, kCandidates> squares{};
     std::array<double, kCandidates> lagged{};
-    std::array<double, kCandidates> before{};  // residual of the sample before
+    std::array<double, kCandidates> begin{};   // residual of the first sample
+    std::array<double, kCandidates> before{};  // and of the last
     double reference = 0;                      // rad, near all residuals
     double square_rate = 0;
     int samples = 0;

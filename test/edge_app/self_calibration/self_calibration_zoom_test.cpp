@@ -111,6 +111,30 @@ TEST_F(ZoomingCamera, AReadingThatJittersIsOneZoom) {
   EXPECT_NEAR(*beside.back().calibration->calibration.zoom, 200.7, jitter_);
 }
 
+// By the next reading, which differs by jitter, the withdrawn one is not used again.
+TEST_F(ZoomingCamera, WhatIsWithdrawnStaysSoThoughItsReadingJitters) {
+  jitter_ = 0.05;
+  ASSERT_FALSE(dwell(0, zoomed(0)).empty());
+  const auto second = dwell(200, zoomed(200, 4));
+  ASSERT_FALSE(second.empty());
+  ASSERT_EQ(nodes(second), 2);
+  static_cast<void>(calibration_.take_messages());
+  test::Feed how;
+  how.tracker = FrameTracks::Tracker::kOe;
+  how.contradicting_from_s = 0;
+  how.zoom_at = [this](double) {
+    return 200 + jitter_ * std::normal_distribution<double>()(random_);
+  };
+  how.from_s = from_s_;
+  how.first_frame = first_frame_;
+  const auto published = test::feed(&calibration_, zoomed(200, 5), how);
+  ASSERT_FALSE(published.empty());
+  EXPECT_FALSE(published[0].calibration->calibrated);
+  const auto messages = calibration_.take_messages();
+  EXPECT_THAT(messages, Contains(HasSubstr("is withdrawn")));
+  EXPECT_THAT(messages, Not(Contains(HasSubstr("the calibration zoom curve holds"))));
+}
+
 TEST_F(ZoomingCamera, HasACurveFromTheSecondZoomOn) {
   ASSERT_FALSE(dwell(0, zoomed(0)).empty());
   const auto second = dwell(200, zoomed(200, 4));
