@@ -216,7 +216,7 @@ void TelemetryDepartures::find_play(const AdjustmentData& data, const Adjustment
     const int steps = static_cast<int>(
         std::clamp(std::ceil((residual.time_s - from_s) / kStep_s), 1.0, kMostSteps));
     for (int step = 1; step <= steps; ++step) {
-      const double time = from_s + step / steps * (residual.time_s - from_s);
+      const double time = from_s + (residual.time_s - from_s) * step / steps;
       const double angle = state.trajectory.position(time).vector()[axis];
       const PlayedAngle dragged = reading.next(angle);
       last[1] = {scale * (dragged.angle - angle), -0.5 * scale * dragged.direction,
