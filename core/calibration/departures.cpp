@@ -18,6 +18,11 @@ namespace {
 // Of all causes together, where nothing departs from the model.
 constexpr double kFalseCause = 0.01;
 constexpr std::size_t kMostCauses = 4;
+constexpr const char* kFifthOrderName = "distortion of fifth order";
+// A lens's distortion of fifth order in the corner: one standard deviation, as a part of the radius
+// there, and of the distortion of third order there.
+constexpr double kUsualFifthOrder = 0.003;
+constexpr double kFifthOfThird = 0.2;
 // What the other unknowns leave of a combination of columns; less is theirs.
 constexpr double kLeastLeft = 1e-6;
 
@@ -250,7 +255,7 @@ std::vector<Suspect> suspects(const AdjustmentState& state,
                               {"play", "mrad", kPlayPan, 2, 1e3},
                               {"one axis late", "ms", kLateAxis, 1, 1e3},
                               {"focal length drifts", "per mille", kFocusDrift, kDriftKnots, 1e3},
-                              {"distortion of fifth order", "px in the corner", kFifthOrder, 1, 1},
+                              {kFifthOrderName, "px in the corner", kFifthOrder, 1, 1},
                               {"pictures late at speed", "ms per 1000 px/s", kLag, 1, 1e6},
                               {"parallax", "mrad", kParallax, 3 * kShapes, 1e3},
                               {"scene moves", "px/s", kDriftingScene, 2 * kShapes, f}};
@@ -260,10 +265,30 @@ std::vector<Suspect> suspects(const AdjustmentState& state,
   return all;
 }
 
+// What the data leave open of the distortion of fifth order, px in the corner: its posterior.
+// information, score: of it, all else eliminated, the other causes too. growth: by how much the
+// data say less of the lens than white errors would allow.
+struct FifthOrder {
+  double mean = 0;
+  double variance = 0;
+};
+
+FifthOrder fifth_order(const AdjustmentState& state, double information, double score,
+                       double growth) {
+  const double corner = std::hypot(0.5 * state.camera.width, 0.5 * state.camera.height);
+  const double prior =
+      corner * std::hypot(kUsualFifthOrder, kFifthOfThird * state.corner_distortion[0]);
+  FifthOrder out;
+  out.variance = 1 / (std::max(0.0, information) / growth + 1 / (prior * prior));
+  out.mean = out.variance * score / growth;
+  return out;
+}
+
 }  // namespace
 
 Departures find_departures(const Adjustment& adjustment, const AdjustmentState& state,
-                           const Linearisation& at, const ReducedFactor& factor) {
+                           const Linearisation& at, const ReducedFactor& factor,
+                           double lens_growth) {
   std::vector<DepartureScore> scores(1, DepartureScore(kColumns, at));
   DepartureScore& score = scores.front();
   Columns columns(adjustment, state, at);
@@ -284,6 +309,8 @@ Departures find_departures(const Adjustment& adjustment, const AdjustmentState& 
   const Eigen::VectorXd full = score.full_information().diagonal();
   Eigen::MatrixXd N = score.information();
   Eigen::VectorXd s = score.score();
+  bool fifth_order_shows = false;
+  double of_fifth_order = N(kFifthOrder, kFifthOrder);
   while (found.causes.size() < kMostCauses) {
     double least = limit;
     std::size_t best = left.size();
@@ -302,6 +329,7 @@ Departures find_departures(const Adjustment& adjustment, const AdjustmentState& 
     if (best == left.size()) break;
     if (found.causes.empty()) likeliest = least;
     const Suspect c = left[best];
+    fifth_order_shows = fifth_order_shows || c.first == kFifthOrder;
     left.erase(left.begin() + static_cast<std::ptrdiff_t>(best));
     const double size = c.in_unit * best_fit.theta.norm() / std::sqrt(c.count);
     found.causes.push_back({c.cause, best_fit.chi_square, best_fit.freedom, size, c.unit});
@@ -323,6 +351,7 @@ Departures find_departures(const Adjustment& adjustment, const AdjustmentState& 
       s -= tied * along.dot(s_of_it);
       N -= tied * (along.transpose() * rows);
     }
+    if (!fifth_order_shows) of_fifth_order = N(kFifthOrder, kFifthOrder);
   }
   const DepthSpread spread = depth_spread(adjustment, state, at, factor);
   if (spread.log_chance < limit) {
@@ -330,6 +359,19 @@ Departures find_departures(const Adjustment& adjustment, const AdjustmentState& 
                         {"different distances", spread.excess, spread.landmarks, 1e3 * spread.sigma,
                          "per mille of the focal length"});
     add_to_focal_length(std::pow(kCommonDepth * spread.sigma, 2));
+  }
+  if (found.causes.empty()) return found;
+  // Residuals that have other causes no longer say that there is none of this.
+  const double shown = fifth_order_shows ? 0 : s[kFifthOrder];
+  const FifthOrder open = fifth_order(state, of_fifth_order, shown, lens_growth);
+  const double square = open.variance + open.mean * open.mean;
+  const GlobalVector effect = score.effect().col(kFifthOrder);
+  found.hidden = square * effect * effect.transpose();
+  if (!fifth_order_shows) {
+    found.causes.push_back(
+        {std::string("possible ") + kFifthOrderName,
+         shown * shown / std::max(of_fifth_order, kLeastLeft * full[kFifthOrder]), 1,
+         std::sqrt(square), "px in the corner"});
   }
   return found;
 }

@@ -6,8 +6,9 @@
 //   pictures    focal length that drifts, r^5 distortion, optical centre, lag at speed,
 //               parallax (a pupil off the axes, and depth), part of the scene that drifts
 // The most improbable cause comes first. The next one is the most improbable with the first one's
-// unknowns free, and so on. False alarms: 1 % for all causes together. Allocates.
-// Derivation: docs/calibration.md.
+// unknowns free, and so on. False alarms: 1 % for all causes together. Beside any cause r^5
+// distortion is possible, too, as far as lenses have it and the residuals do not exclude it.
+// Allocates. Derivation: docs/calibration.md.
 
 #include <vector>
 
@@ -17,12 +18,18 @@
 namespace alidade::internal {
 
 struct Departures {
-  std::vector<CalibrationCause> causes;       // the likeliest first
-  GlobalMatrix error = GlobalMatrix::Zero();  // to add to the parameters' covariance
+  std::vector<CalibrationCause> causes;  // the likeliest first
+  // To add to the parameters' covariance: what causes do that residuals show, in parts of the
+  // recording too, and what r^5 distortion does that no part shows.
+  GlobalMatrix error = GlobalMatrix::Zero();
+  GlobalMatrix hidden = GlobalMatrix::Zero();
 };
 
 // state, at, factor: the minimum of least squares, of which adjustment has the covariance.
+// lens_growth: of the variance with which the data tell the distortion, over that with white
+// errors; at least 1.
 [[nodiscard]] Departures find_departures(const Adjustment& adjustment, const AdjustmentState& state,
-                                         const Linearisation& at, const ReducedFactor& factor);
+                                         const Linearisation& at, const ReducedFactor& factor,
+                                         double lens_growth);
 
 }  // namespace alidade::internal

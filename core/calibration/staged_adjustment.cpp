@@ -153,6 +153,7 @@ StageStatus StagedAdjustment::adjust_on_inliers(CalibrationQuality* quality) {
     }
   }
   release_centre();
+  adjusted_.covariance += hidden_;
   return {};
 }
 
@@ -346,10 +347,16 @@ void StagedAdjustment::allow_for_contradictions(CalibrationQuality* quality) {
   const ContradictionCheck check =
       check_contradictions(usual_divisions(adjusted_.state.trajectory, times.front(), times.back()),
                            adjustment_, adjusted_.state, adjusted_.at, factor);
-  const Departures departures = find_departures(adjustment_, adjusted_.state, adjusted_.at, factor);
+  const auto first_global = adjusted_.at.H.rows() - kGlobalCount;
+  const int k = index(Parameter::kRadialDistortion);
+  const double white_k = adjustment_.global_rows()(k, first_global + k);
+  const double lens_growth =
+      white_k > 0 ? std::max(check.growth[k], adjusted_.covariance(k, k) / white_k) : 1;
+  const Departures departures =
+      find_departures(adjustment_, adjusted_.state, adjusted_.at, factor, lens_growth);
   quality->causes = departures.causes;
   adjusted_.covariance += departures.error;
-  const auto first_global = adjusted_.at.H.rows() - kGlobalCount;
+  hidden_ = departures.hidden;
   // What landmarks and frames have in common is part of what parts show.
   GlobalVector root = GlobalVector::Ones();
   for (int p = 0; p < kGlobalCount; ++p) {

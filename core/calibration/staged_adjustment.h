@@ -78,6 +78,7 @@ class StagedAdjustment {
   double telemetry_unknowns_ = 0;
   CentreShare<kGlobalCount> centre_;
   GlobalMatrix centre_held_ = GlobalMatrix::Zero();  // covariance before it grew
+  GlobalMatrix hidden_ = GlobalMatrix::Zero();       // Departures
   bool settled_ = false;                             // by settle_robustly()
   DriftFinding drift_ = DriftFinding::kNone;
   double drift_px_s_ = 0;
