@@ -1,6 +1,7 @@
 #include "core/realtime/oe_mode/oe_mode.h"
 
 #include <cmath>
+#include <optional>
 
 #include "core/realtime/pt_mode.h"
 
@@ -46,6 +47,7 @@ void OeMode::reset(const Calibration& calibration, FocalLength focal_length) {
   offset_.forget_error();
   forget_map();
   drift_.reset();
+  follower_.reset();
   moving_.clear();
   frames_ = 0;
 }
@@ -299,9 +301,10 @@ OeStatus OeMode::answer_with_landmarks(const PredictedMotion& predicted, const S
 
   const MapOffset& offset = offset_.offset();
   FrameMotion<double> in_base = motion;
-  const TiedOffset added = offset_of_answer(solved);
+  const std::optional<FollowedOffset> followed = followed_offset();
+  const TiedOffset added = offset_of_answer(solved, followed);
   in_base.angle = {motion.angle.pan + added.value.x(), motion.angle.tilt + added.value.y()};
-  Matrix6 covariance = covariance_of_answer(solved, added);
+  Matrix6 covariance = covariance_of_answer(solved, added, followed);
   Sensitivity<6> sensitivity = solved.sensitivity;
   sensitivity.topRows<2>() += added.sensitivity;
   covariance += sensitivity * calibration_.lens().unshared(offset_.lens()).asDiagonal() *

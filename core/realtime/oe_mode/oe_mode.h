@@ -13,6 +13,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 
 #include "core/model/calibration.h"
 #include "core/realtime/frame_orientation.h"
@@ -24,6 +25,7 @@
 #include "core/realtime/oe_mode/landmark_map.h"
 #include "core/realtime/oe_mode/landmark_search.h"
 #include "core/realtime/oe_mode/maintained_map.h"
+#include "core/realtime/oe_mode/map_follower.h"
 #include "core/realtime/oe_mode/map_offset_filter.h"
 #include "core/realtime/oe_mode/map_state.h"
 #include "core/realtime/oe_mode/motion_prediction.h"
@@ -204,11 +206,14 @@ class OeMode {
   OeStatus answer_with_landmarks(const PredictedMotion& predicted, const Solution& solution,
                                  FrameOrientation* out);
 
+  // The map's offset where the map may be going along with what moves.
+  [[nodiscard]] std::optional<FollowedOffset> followed_offset() const;
   // Base of an answer with landmarks, including what is known from outside: what is added to the
   // map's angles, and the total covariance.
-  [[nodiscard]] TiedOffset offset_of_answer(const SolvedMotion& solved) const;
-  [[nodiscard]] Matrix6 covariance_of_answer(const SolvedMotion& solved,
-                                             const TiedOffset& added) const;
+  [[nodiscard]] TiedOffset offset_of_answer(const SolvedMotion& solved,
+                                            const std::optional<FollowedOffset>& followed) const;
+  [[nodiscard]] Matrix6 covariance_of_answer(const SolvedMotion& solved, const TiedOffset& added,
+                                             const std::optional<FollowedOffset>& followed) const;
   [[nodiscard]] SharedByView shared_by_view(const SolvedMotion& solved) const;
   void note_landmarks_answer(const SolvedMotion& solved, const TiedOffset& added);
   [[nodiscard]] bool tie_telemetry(FrameOrientation* out);
@@ -256,6 +261,7 @@ class OeMode {
 
   OeStatistics statistics_;
   ProcessedFrame frame_;  // written by process(), used up by maintain()
+  MapFollower follower_;
 };
 
 }  // namespace alidade

@@ -1,14 +1,30 @@
 // The base of OeMode's answers: telemetry's, or one given from outside.
 
+#include <optional>
+
 #include "core/realtime/oe_mode/oe_mode.h"
 
 namespace alidade {
 
-TiedOffset OeMode::offset_of_answer(const SolvedMotion& solved) const {
+std::optional<FollowedOffset> OeMode::followed_offset() const {
+  FollowedOffset out;
+  if (tie_.is_by_map() || lens_is_learnt() || frame_.telemetry == FrameTelemetry::kNone ||
+      !follower_.follow(frame_.time_s, 1 / camera().focal_length, &out)) {
+    return std::nullopt;
+  }
+  // All of the last second's readings share the error of the angle.
+  out.variance += frame_.error.variance;
+  return out;
+}
+
+TiedOffset OeMode::offset_of_answer(const SolvedMotion& solved,
+                                    const std::optional<FollowedOffset>& followed) const {
   if (tie_.is_by_map()) return tie_.of_map();
   const MapOffset& offset = offset_.offset();
   const TiedOffset zero = tie_.of_telemetry(offset);
-  return {offset.value + solved.offset_correction + zero.value, zero.covariance,
+  const Vector2<double> value =
+      followed ? followed->value : Vector2<double>(offset.value + solved.offset_correction);
+  return {value + zero.value, zero.covariance,
           offset.sensitivity + solved.offset_correction_sensitivity + zero.sensitivity};
 }
 
@@ -21,13 +37,19 @@ SharedByView OeMode::shared_by_view(const SolvedMotion& solved) const {
 }
 
 // If the map itself is tied, the uncertainty of its offset against telemetry does not matter.
-Matrix6 OeMode::covariance_of_answer(const SolvedMotion& solved, const TiedOffset& added) const {
+Matrix6 OeMode::covariance_of_answer(const SolvedMotion& solved, const TiedOffset& added,
+                                     const std::optional<FollowedOffset>& followed) const {
   const bool by_map = tie_.is_by_map();
-  Matrix6 covariance = by_map ? solved.frame_covariance : solved.covariance;
+  Matrix6 covariance = by_map || followed ? solved.frame_covariance : solved.covariance;
   covariance.topLeftCorner<2, 2>() +=
       by_map ? tie_.covariance_in(shared_by_view(solved)) : added.covariance;
   map_.shear().add_to(&covariance);
-  covariance.topLeftCorner<2, 2>() += drift_.doubt();
+  // What is followed needs no doubt of how far the map has gone along.
+  if (followed) {
+    covariance.topLeftCorner<2, 2>().diagonal() += followed->variance;
+  } else {
+    covariance.topLeftCorner<2, 2>() += drift_.doubt();
+  }
   return covariance;
 }
 

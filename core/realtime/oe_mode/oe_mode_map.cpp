@@ -50,6 +50,7 @@ void OeMode::forget_map() {
   map_.begin(calibration);
   search_.clear();
   drift_.begin_map();
+  follower_.begin_map();
   offset_.begin_lens(calibration_.scale_of_given());
   offset_.reset();
   prediction_.reset(calibration);
@@ -102,7 +103,9 @@ void OeMode::maintain() {
 
 void OeMode::note_offsets() {
   SeenOffset seen;
-  if (offset_.take_seen(&seen)) drift_.note(seen);
+  if (!offset_.take_seen(&seen)) return;
+  drift_.note(seen);
+  follower_.note(seen);
 }
 
 bool OeMode::judge_scene() {
@@ -120,21 +123,20 @@ bool OeMode::judge_scene() {
     const OeObservation& seen = observations[i];
     if (!map_.landmarks().occupied(seen.slot)) continue;
     const Landmark& landmark = map_.landmarks().at(seen.slot);
-    const LandmarkStatistics& s = landmark.statistics;
     const Vector2<double> off = search_.J_tangent()[i].inverse() * seen.residual;
     if (!all_finite(off)) continue;
-    drift_.note_landmark(seen.slot, seen.id, direction_plus<double>(landmark.d, off),
-                         (s.matched + 1.0) / (s.looked_for + 1.0));
+    drift_.note_landmark(seen.slot, seen.id, direction_plus<double>(landmark.d, off));
   }
   const double pixel = 1 / camera().focal_length;
   const SceneVerdict verdict = drift_.judge(pixel);
+  if (const auto rate = drift_.moving_rate()) follower_.note_moving(frame_.time_s, *rate);
   const double radius = kCells * options_.maker.cell_size_px * pixel;
   drift_.for_each_moving(
       [&](int, std::uint32_t, const Vector3<double>& d, const Vector2<double>& rate) {
         moving_.add(d, rate, radius, frame_.time_s);
       });
-  return verdict == SceneVerdict::kAllMove || verdict == SceneVerdict::kMapMoves ||
-         (verdict == SceneVerdict::kPartMoves && drift_.has_bent_map());
+  // Where the lesser part moves, the rest is ground: it stays, and the offset follows what it bent.
+  return verdict == SceneVerdict::kAllMove || verdict == SceneVerdict::kMapMoves;
 }
 
 // The map's frame becomes telemetry's present one.
@@ -157,6 +159,7 @@ void OeMode::begin_map() {
 // The landmarks were straightened: so is what came from them.
 void OeMode::straighten(const ShearCorrection& correction) {
   offset_.move_offset(-correction.angle);
+  follower_.move_offset(-correction.angle);
   tie_.move_map(-correction.angle);
   offset_.correct_pending([&](const Vector2<double>& angle) -> Vector2<double> {
     return correction.angle_error(correction.time_of(angle.y()));

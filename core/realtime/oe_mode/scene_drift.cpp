@@ -24,10 +24,6 @@ constexpr double kLeastRate_px_s = 0.1;
 constexpr double kLeastRateOfAll_px_s = 0.2;
 // Of the camera's rate. By so much landmarks drift as they are near and the pupil is off the axes.
 constexpr double kParallax = 0.002;
-// From there on a group that moves had its part in the map: share of looks in which it agreed with
-// the map, and of the landmarks.
-constexpr double kBendingMatched = 0.5;
-constexpr double kBendingShare = 0.25;
 constexpr double kDecided = 12;  // difference of chi-squares
 constexpr double kProven = 9;
 constexpr double kMoves = 30;        // chi-square of one group
@@ -59,7 +55,6 @@ void SceneDrift::begin_map() {
   mean_square_rate_ = 0;
   verdict_ = SceneVerdict::kRest;
   doubt_.setZero();
-  bent_ = false;
 }
 
 void SceneDrift::note(const SeenOffset& seen) {
@@ -92,8 +87,7 @@ void SceneDrift::begin_frame(double time_s, const Vector2<double>& rate) {
   mean_square_rate_ += kShare * (rate.squaredNorm() - mean_square_rate_);
 }
 
-void SceneDrift::note_landmark(int slot, std::uint32_t id, const Vector3<double>& d,
-                               double matched) {
+void SceneDrift::note_landmark(int slot, std::uint32_t id, const Vector3<double>& d) {
   if (noted_count_ == noted_.size() || !all_finite(d)) return;
   const double elevation = -std::asin(std::clamp(d.z(), -1.0, 1.0));
   if (std::abs(elevation) > kSteep) return;
@@ -121,7 +115,6 @@ void SceneDrift::note_landmark(int slot, std::uint32_t id, const Vector3<double>
   noted.slot = slot;
   noted.id = id;
   noted.d = d;
-  noted.matched = matched;
 }
 
 void SceneDrift::find_rates(double pixel) {
@@ -177,7 +170,6 @@ bool SceneDrift::find_groups(double pixel) {
   const double rate = between.norm();
   int alike = 0;
   double life_s = 0;
-  double matched = 0;
   for (std::size_t i = 0; i < noted_count_; ++i) {
     const Noted& noted = noted_[i];
     if (!noted.apart) continue;
@@ -186,9 +178,7 @@ bool SceneDrift::find_groups(double pixel) {
       continue;
     ++alike;
     life_s += noted.life_s;
-    matched += noted.matched;
   }
-  bent_ = matched > kBendingMatched * alike && alike > kBendingShare * tested;
   return alike >= least && alike >= kCoherent * apart &&
          rate > std::max(kLeastRate_px_s * pixel, kParallax * std::sqrt(mean_square_rate_)) &&
          rate * life_s > kLeastShift_px * pixel * alike;
@@ -230,7 +220,6 @@ SceneVerdict SceneDrift::judge(double pixel) {
   find_rates(pixel);
   const bool two = find_groups(pixel);
   if (!two) {
-    bent_ = false;
     for (std::size_t i = 0; i < noted_count_; ++i) noted_[i].apart = false;
   }
   return verdict_ = two ? judge_two(pixel) : judge_one(pixel);
@@ -269,7 +258,7 @@ SceneVerdict SceneDrift::judge_one(double pixel) {
     moved_rate_ = rate_;
     return SceneVerdict::kAllMove;
   }
-  if (steady && since_s >= kLeastTrial_s && chi > kAlike) {
+  if (steady && since_s >= kLeastLife_s && chi > kAlike) {
     // Half of the way that the map would have gone, by how likely it has.
     const Vector2<double> way = 0.5 * std::min(since_s, kMemory_s) * rate_;
     doubt_ = way * way.transpose() / (1 + std::exp(0.5 * (9 - chi)));

@@ -12,6 +12,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "core/model/linear_algebra.h"
@@ -50,9 +51,8 @@ class SceneDrift {
   void note(const SeenOffset& seen);
   // Begins a frame in which landmarks held. rate: rad/s, the camera's.
   void begin_frame(double time_s, const Vector2<double>& rate);
-  // d: unit, where it was found, in the map's frame. matched: share of looks in which the landmark
-  // agreed with the map.
-  void note_landmark(int slot, std::uint32_t id, const Vector3<double>& d, double matched);
+  // d: unit, where it was found, in the map's frame.
+  void note_landmark(int slot, std::uint32_t id, const Vector3<double>& d);
   // Of that frame. pixel: rad.
   SceneVerdict judge(double pixel);
 
@@ -75,8 +75,11 @@ class SceneDrift {
       if (moves) use(n.slot, n.id, n.d, n.apart ? apart_rate_ : rate_);
     }
   }
-  // Landmarks that moved had their part in the map.
-  [[nodiscard]] bool has_bent_map() const { return bent_; }
+  // rad/s, of what moves against the rest, or of all. None if nothing was seen to move.
+  [[nodiscard]] std::optional<double> moving_rate() const {
+    if (verdict_ == SceneVerdict::kRest) return std::nullopt;
+    return verdict_ == SceneVerdict::kAllMove ? rate_.norm() : (apart_group_ - group_).norm();
+  }
 
   [[nodiscard]] std::size_t memory_bytes() const { return records_.capacity() * sizeof(Record); }
 
@@ -98,7 +101,6 @@ class SceneDrift {
     int slot = 0;
     std::uint32_t id = 0;
     Vector3<double> d = Vector3<double>::Zero();
-    double matched = 0;
     bool tested = false;
     bool apart = false;
     Vector2<double> rate = Vector2<double>::Zero();
@@ -143,7 +145,6 @@ class SceneDrift {
   Vector2<double> group_ = Vector2<double>::Zero();  // in the map's frame
   Vector2<double> apart_group_ = Vector2<double>::Zero();
   Matrix2<double> doubt_ = Matrix2<double>::Zero();
-  bool bent_ = false;
   bool on_trial_ = false;
   Vector2<double> moved_rate_ = Vector2<double>::Zero();  // of what moved last
 };
