@@ -157,6 +157,7 @@ FrameError RealityTruth::frame_error(const FoundCalibration& found,
   const Vector3d seen = R.transpose() * truth;
   const double f = focal_length();
   FrameError error;
+  error.frame = orientation.frame;
   error.oe = orientation.oe;
   error.px = f * (seen.head<2>() / seen.z() - slope);
   // A rotation w about the camera's axes moves what lies ahead by (w_y, -w_x).

@@ -61,6 +61,7 @@ struct FoundOrientation {
 [[nodiscard]] std::optional<FoundOrientation> read_found_orientation(const std::string& line);
 
 struct FrameError {
+  int frame = -1;
   bool oe = false;
   Eigen::Vector2d px;                              // truth - estimate, along u and v
   Eigen::Matrix2d covariance;                      // px^2

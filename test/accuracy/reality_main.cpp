@@ -1,7 +1,7 @@
 // alidade_reality: how honest and how accurate calibration and OE mode are if the camera departs
 // from the model.
 //   alidade_reality [--rows gear,play] [--seeds N] [--seed S] [--cache DIR] [--json FILE]
-//                   [--measure]
+//                   [--results DIR [--calibrated]] [--measure]
 // For each row (reality_film.h) and seed: makes a film with the virtual camera, runs `alidade
 // calibrate` and `alidade replay --mode OE` on it, and compares both with the truth
 // (reality_judge.h).
@@ -42,6 +42,7 @@ struct Options {
   std::string alidade = ALIDADE_PROGRAM;
   std::string json;
   bool measure = false;
+  bool calibrated = false;  // the calibrations that `results` holds are judged, none is made
 };
 
 constexpr int kRefused = 1;  // exit status of `alidade calibrate`; a usage it does not know is 2
@@ -56,6 +57,19 @@ std::string last_line(const std::string& errors) {
   return last;
 }
 
+// px: truth minus estimate of the middle's direction, along u and v.
+void write_errors(const SeedResult& result, const fs::path& path) {
+  std::ofstream file(path);
+  file << "frame,mode,error_u_px,error_v_px,sigma_u_px,sigma_v_px,square\n";
+  for (const FrameError& error : result.frame_errors) {
+    file << fmt::format("{},{},{:.4f},{:.4f},{:.4f},{:.4f},{:.3f}\n", error.frame,
+                        error.oe ? "OE" : "PT", error.px.x(), error.px.y(),
+                        std::sqrt(error.covariance(0, 0)), std::sqrt(error.covariance(1, 1)),
+                        error.normalised_square());
+  }
+  if (!file.flush()) throw std::runtime_error(path.string() + ": cannot be written");
+}
+
 SeedResult judge(const Options& options, const RealityRow& row, std::uint64_t seed,
                  const fs::path& results) {
   SeedResult result;
@@ -64,15 +78,17 @@ SeedResult judge(const Options& options, const RealityRow& row, std::uint64_t se
   const fs::path folder = kept_film(film, fmt::format("{}-{}", row.name, seed), options.cache);
   const std::string recording = (folder / "recording").string();
 
-  Process calibrate({options.alidade, "calibrate", "-o", results.string(), recording});
-  static_cast<void>(calibrate.read_all());
-  const int status = calibrate.wait();
-  if (status == kRefused) {
-    result.refusal = last_line(calibrate.errors());
-    return result;
-  }
-  if (status != 0) throw std::runtime_error(recording + ": " + last_line(calibrate.errors()));
   const std::string file = (results / "calibration.yaml").string();
+  if (!options.calibrated || !fs::exists(file)) {
+    Process calibrate({options.alidade, "calibrate", "-o", results.string(), recording});
+    static_cast<void>(calibrate.read_all());
+    const int status = calibrate.wait();
+    if (status == kRefused) {
+      result.refusal = last_line(calibrate.errors());
+      return result;
+    }
+    if (status != 0) throw std::runtime_error(recording + ": " + last_line(calibrate.errors()));
+  }
   const FoundCalibration found = read_found_calibration(file);
   const RealityTruth truth(simulator::load_config(folder / "film.yaml"));
   result.error = truth.calibration_error(found);
@@ -87,6 +103,7 @@ SeedResult judge(const Options& options, const RealityRow& row, std::uint64_t se
     }
   }
   if (replay.wait() != 0) throw std::runtime_error(recording + ": " + last_line(replay.errors()));
+  write_errors(result, results / "errors.csv");
   return result;
 }
 
@@ -224,7 +241,9 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--seed", options.first_seed, "The first one")->capture_default_str();
   app.add_option("--cache", options.cache, "Keeps the films")->capture_default_str();
-  app.add_option("--results", options.results, "Keeps calibrations and records here");
+  app.add_option("--results", options.results,
+                 "Keeps calibrations, records and each frame's error here");
+  app.add_flag("--calibrated", options.calibrated, "With the calibrations that --results holds");
   app.add_option("--alidade", options.alidade, "The program that is judged")
       ->envname("ALIDADE")
       ->check(CLI::ExistingFile);

@@ -195,11 +195,12 @@ bool LandmarkMaker::make_one(const View& view, const FastCorner& corner, int oct
   Sensitivity<2> sensitivity =
       to_tangent * (J_d_parameters + J_d_motion * view.frame.sensitivity.topRows<4>());
   landmark.J_pixel_tangent = J_tangent_u.inverse() / to_image;
-  // The reference point is exact by definition. The image's noise makes it find itself elsewhere.
+  // The reference point is exact by definition. The image's noise makes it find itself elsewhere,
+  // and so does what made this frame's residuals larger than their covariances.
   const Matrix2<double> J_tangent_pixel = to_image * J_tangent_u;
   const double noise = view.octaves.noise(octave);
-  landmark.covariance = noise * noise * J_tangent_pixel * patch.unit_covariance.cast<double>() *
-                        J_tangent_pixel.transpose();
+  landmark.covariance = view.frame.inflation * noise * noise * J_tangent_pixel *
+                        patch.unit_covariance.cast<double>() * J_tangent_pixel.transpose();
   if (view.lens != nullptr) {
     // The error of the frame's own lens is not the map's scale.
     const OwnLens& own = view.frame.lens;

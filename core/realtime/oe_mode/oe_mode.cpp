@@ -49,6 +49,7 @@ void OeMode::reset(const Calibration& calibration, FocalLength focal_length) {
   drift_.reset();
   follower_.reset();
   moving_.clear();
+  sharing_.reset();
   frames_ = 0;
 }
 
@@ -166,6 +167,7 @@ OeMode::Solution OeMode::solve_about(const FrameMotion<double>& motion,
   statistics_.found = fine.found;
   MotionPrior prior = predicted.prior;
   prior.offset_covariance = offset_.offset().covariance;
+  prior.sharing = sharing_.factor();
   if (lens_is_learnt()) {
     prior.lens = &offset_.lens();
     prior.scale_inflation = offset_.scale_inflation(frame_.time_s);
@@ -293,6 +295,7 @@ OeStatus OeMode::answer_with_landmarks(const PredictedMotion& predicted, const S
   search_.conclude(solved.correction, solved.zoom.correction);
   map_.note_held();
   offset_.note_agreement();
+  sharing_.note(solved.single_squares, solved.large_squares, solved.large_averages);
   frame_.motion = motion;
   frame_.covariance = solved.frame_covariance;
   frame_.shared_covariance = solved.shared_covariance;

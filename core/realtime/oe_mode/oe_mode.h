@@ -21,6 +21,7 @@
 #include "core/realtime/lens/frame_lens.h"
 #include "core/realtime/oe_mode/base_tie.h"
 #include "core/realtime/oe_mode/calibration_in_use.h"
+#include "core/realtime/oe_mode/error_sharing.h"
 #include "core/realtime/oe_mode/image_octaves.h"
 #include "core/realtime/oe_mode/landmark_map.h"
 #include "core/realtime/oe_mode/landmark_search.h"
@@ -258,6 +259,7 @@ class OeMode {
   BaseTie tie_;
   SceneDrift drift_;
   MovingDirections moving_;
+  ErrorSharing sharing_;
 
   OeStatistics statistics_;
   ProcessedFrame frame_;  // written by process(), used up by maintain()

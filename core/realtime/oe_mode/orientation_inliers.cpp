@@ -2,6 +2,7 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <cmath>
 
 #include "core/realtime/oe_mode/orientation_without_angles.h"
 
@@ -112,34 +113,50 @@ bool gate(const OrientationProblem& problem, const ScaledPrior& scaled, const So
   return true;
 }
 
-double neighbours_inflation(const OrientationProblem& problem, const FoundLandmark* landmarks,
-                            double width, double height, const MotionAndLens& x) {
-  constexpr int kColumns = 10;
-  constexpr int kRows = 6;
+ResidualSquares single_squares(const Fit& fit, const FoundLandmark* landmarks, int count) {
+  ResidualSquares out{0, -6};
+  for (int i = 0; i < count; ++i) {
+    if (!landmarks[i].inlier) continue;
+    out.sum += fit.squares[static_cast<std::size_t>(i)];
+    out.freedom += 2;
+  }
+  return out;
+}
+
+ResidualSquares neighbours_squares(const OrientationProblem& problem,
+                                   const FoundLandmark* landmarks, double width, double height,
+                                   const ImageCells& cells, const MotionAndLens& x,
+                                   LargeAverages* averages) {
   struct Cell {
     Matrix2<double> information = Matrix2<double>::Zero();
     Vector2<double> sum = Vector2<double>::Zero();
     bool used = false;
   };
-  std::array<Cell, kColumns * kRows> cells;
+  std::array<Cell, kSmallCells.columns * kSmallCells.rows> all;
   for (int i = 0; i < problem.count(); ++i) {
     if (!landmarks[i].inlier) continue;
+    const Vector2<double>& u = landmarks[i].u;
     const int column =
-        std::clamp(static_cast<int>(landmarks[i].u.x() / width * kColumns), 0, kColumns - 1);
-    const int row = std::clamp(static_cast<int>(landmarks[i].u.y() / height * kRows), 0, kRows - 1);
-    Cell& cell = cells[static_cast<std::size_t>(row * kColumns + column)];
+        std::clamp(static_cast<int>(u.x() / width * cells.columns), 0, cells.columns - 1);
+    const int row = std::clamp(static_cast<int>(u.y() / height * cells.rows), 0, cells.rows - 1);
+    Cell& cell = all[static_cast<std::size_t>(row * cells.columns + column)];
     cell.information += problem.term(i).information;
     cell.sum += problem.term(i).information * problem.left(i, x);
     cell.used = true;
   }
-  int freedom = -6;
-  double square = 0;
-  for (const Cell& cell : cells) {
+  ResidualSquares out{0, -cells.absorbed};
+  for (const Cell& cell : all) {
     if (!cell.used) continue;
-    freedom += 2;
-    square += cell.sum.dot(inverse_of(cell.information) * cell.sum);
+    out.freedom += 2;
+    out.sum += cell.sum.dot(inverse_of(cell.information) * cell.sum);
   }
-  return freedom > 6 ? square / freedom : 1;
+  for (std::size_t i = 0; averages != nullptr && i < kLargeCellCount; ++i) {
+    for (Eigen::Index k = 0; all[i].used && k < 2; ++k) {
+      (*averages)[2 * i + static_cast<std::size_t>(k)] =
+          all[i].sum[k] / std::sqrt(all[i].information(k, k));
+    }
+  }
+  return out;
 }
 
 }  // namespace alidade::internal

@@ -23,7 +23,7 @@ struct Fit {
   MotionAndLens x;
   Squares squares;          // at x
   Weights weights;          // as last used
-  double scale_square = 1;  // factor for the landmarks' covariances
+  double scale_square = 1;  // factor for the landmarks' covariances, by gate()
   int inliers = 0;          // by gate()
 };
 
@@ -37,11 +37,27 @@ void find_squares(const OrientationProblem& problem, const MotionAndLens& x, Squ
 [[nodiscard]] bool gate(const OrientationProblem& problem, const ScaledPrior& scaled,
                         const SolveLimits& limits, FoundLandmark* landmarks, Fit* fit);
 
-// Factor for the landmarks' covariances: by how much the squares of residuals averaged over
-// neighbours exceed what independent errors leave. About 1 if the errors are independent; 1 if too
-// few neighbourhoods have landmarks. width, height: px, of the image.
-[[nodiscard]] double neighbours_inflation(const OrientationProblem& problem,
-                                          const FoundLandmark* landmarks, double width,
-                                          double height, const MotionAndLens& x);
+// Squares of the inliers' residuals.
+[[nodiscard]] ResidualSquares single_squares(const Fit& fit, const FoundLandmark* landmarks,
+                                             int count);
+
+// Neighbourhoods of an image. The motion takes `absorbed` degrees of freedom from their averages:
+// all that depends on the row alone, as far as it is not averaged out within a cell.
+struct ImageCells {
+  int columns, rows;
+  double absorbed;
+};
+inline constexpr ImageCells kSmallCells = {10, 6, 6};
+inline constexpr ImageCells kLargeCells = {3, 2, 3.5};
+static_assert(kLargeCells.columns * kLargeCells.rows == static_cast<int>(kLargeCellCount));
+
+// Squares of the inliers' residuals averaged over neighbours: more than those of single ones if
+// neighbours share errors. width, height: px, of the image. cells: at most kSmallCells. averages:
+// of kLargeCells, in standard deviations; may be null.
+[[nodiscard]] ResidualSquares neighbours_squares(const OrientationProblem& problem,
+                                                 const FoundLandmark* landmarks, double width,
+                                                 double height, const ImageCells& cells,
+                                                 const MotionAndLens& x,
+                                                 LargeAverages* averages = nullptr);
 
 }  // namespace alidade::internal

@@ -64,10 +64,16 @@ SolveStatus solve_orientation(FoundLandmark* landmarks, int count, const MotionP
   if (!internal::robust_start(problem, prior, scaled, unit_s, limits, landmarks, &fit))
     return SolveStatus::kNotFinite;
   if (!internal::gate(problem, scaled, limits, landmarks, &fit)) return SolveStatus::kTooFew;
-  const double inflation = std::max(
-      fit.scale_square, internal::neighbours_inflation(problem, landmarks, width, height, fit.x));
+  const ResidualSquares small =
+      internal::neighbours_squares(problem, landmarks, width, height, internal::kSmallCells, fit.x);
+  out->large_squares = internal::neighbours_squares(
+      problem, landmarks, width, height, internal::kLargeCells, fit.x, &out->large_averages);
+  out->single_squares = internal::single_squares(fit, landmarks, count);
+  // With few neighbourhoods too little is known.
+  const double inflation =
+      std::max(fit.scale_square, small.freedom > 6 ? small.sum / small.freedom : 1.0);
   const internal::FromLandmarks known = internal::sums_of_landmarks(
-      given, landmarks, fit.weights.data(), inflation, &out->shared_covariance);
+      given, landmarks, fit.weights.data(), prior.sharing * inflation, &out->shared_covariance);
 
   // With telemetry's angles, unless they contradict the landmarks.
   out->contradiction = 0;

@@ -59,7 +59,19 @@ struct MotionPrior {
   // earlier frames, too.
   double scale_inflation = 1;
   const ZoomPrior* zoom = nullptr;  // null: the lens is the map's. Needs `lens`.
+  // >= 1; factor for the covariances of landmarks, beyond what they scatter singly, as neighbours
+  // share errors (ErrorSharing).
+  double sharing = 1;
 };
+
+// Of residuals, relative to what independent errors with the claimed covariances leave.
+struct ResidualSquares {
+  double sum = 0;
+  double freedom = 0;  // degrees
+};
+// Of both components, by cell.
+inline constexpr std::size_t kLargeCellCount = 6;
+using LargeAverages = std::array<double, 2 * kLargeCellCount>;
 
 enum class SolveStatus {
   kOk,
@@ -100,7 +112,12 @@ struct SolvedMotion {
   SolvedLens lens;                                                        // if it is learnt
   SolvedZoom zoom;                                                        // if the prior has a zoom
   int inliers = 0;
-  double inflation = 1;      // of the landmarks' covariances
+  double inflation = 1;  // of the landmarks' covariances, without MotionPrior::sharing
+  // The inliers' residuals, and their averages over sixths of the picture; these also one by one,
+  // in standard deviations, 0 where no landmark is.
+  ResidualSquares single_squares;
+  ResidualSquares large_squares;
+  LargeAverages large_averages{};
   double contradiction = 0;  // chi-square, 2 degrees of freedom: landmarks against telemetry
   // Innovation: rad, telemetry's angles minus landmarks', without the earlier offset. Its
   // covariance: rad^2, without g and without the landmarks' common error.
@@ -126,8 +143,8 @@ struct SolveLimits {
 // the gate count fully, the others not at all. Up to half of the landmarks may be wrong.
 // Covariance: that of the linear problem, multiplied by the factor by which squares of residuals
 // exceed their covariances; residuals count single or averaged over neighbours (within a tenth of
-// the image's width), as averages reveal common errors. The landmarks' shared covariance, averaged
-// with their weights, is added.
+// the image's width), as averages reveal common errors. It is multiplied by prior.sharing, too. The
+// landmarks' shared covariance, averaged with their weights, is added.
 [[nodiscard]] SolveStatus solve_orientation(FoundLandmark* landmarks, int count,
                                             const MotionPrior& prior, const SolveLimits& limits,
                                             double width, double height, double half_readout_s,

@@ -1,0 +1,40 @@
+#pragma once
+// ErrorSharing: how much of their errors landmarks have in common with their neighbours in the
+// picture, and frames with the next ones, as in haze or pictures of a low bit rate.
+//   sharing    = mean square of averages over sixths of the picture / that of single residuals
+//   repetition = 1 + 2 sum of the correlations of these averages, 1 to kLags frames apart
+//   factor     = 1 + (sharing - 1) repetition
+// Squares are in units of what independent errors with the claimed covariances leave. What a sixth
+// of the picture shares, the frame's angle, rate and acceleration share, too, and what the map
+// takes over from several frames. Learnt over some seconds of frames; 1 where errors are
+// independent. No allocation. One thread.
+
+#include <array>
+#include <cstddef>
+
+#include "core/realtime/oe_mode/orientation_solve.h"
+
+namespace alidade {
+
+class ErrorSharing {
+ public:
+  void reset() { *this = {}; }
+  // A frame that landmarks answered.
+  void note(const ResidualSquares& single, const ResidualSquares& large,
+            const LargeAverages& averages);
+  [[nodiscard]] double factor() const;      // >= 1, for the covariance of a frame
+  [[nodiscard]] double repetition() const;  // >= 1
+
+ private:
+  static constexpr double kMemory = 64;        // frames
+  static constexpr double kFirstFreedom = 12;  // degrees, of independent errors before the first
+  static constexpr std::size_t kLags = 8;      // frames
+
+  ResidualSquares single_{kFirstFreedom, kFirstFreedom};
+  ResidualSquares large_{kFirstFreedom, kFirstFreedom};
+  std::array<LargeAverages, kLags> before_{};  // newest first
+  // Of the averages, 0 to kLags frames apart.
+  std::array<double, kLags + 1> products_{kFirstFreedom};
+};
+
+}  // namespace alidade
