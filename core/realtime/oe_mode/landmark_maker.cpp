@@ -198,9 +198,9 @@ bool LandmarkMaker::make_one(const View& view, const FastCorner& corner, int oct
   // The reference point is exact by definition. The image's noise makes it find itself elsewhere,
   // and so does what made this frame's residuals larger than their covariances.
   const Matrix2<double> J_tangent_pixel = to_image * J_tangent_u;
-  const double noise = view.octaves.noise(octave);
-  landmark.covariance = view.frame.inflation * noise * noise * J_tangent_pixel *
-                        patch.unit_covariance.cast<double>() * J_tangent_pixel.transpose();
+  const double noise = std::sqrt(view.frame.inflation) * view.octaves.noise(octave);
+  landmark.covariance = noise * noise * J_tangent_pixel * patch.unit_covariance.cast<double>() *
+                        J_tangent_pixel.transpose();
   if (view.lens != nullptr) {
     // The error of the frame's own lens is not the map's scale.
     const OwnLens& own = view.frame.lens;
