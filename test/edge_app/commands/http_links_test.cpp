@@ -69,6 +69,22 @@ TEST_F(HttpLinks, AreMeasuredByCheck) {
   EXPECT_THAT(result.errors, HasSubstr("time stamps cannot be used"));
 }
 
+TEST_F(HttpLinks, RunWarnsThatACalibrationWithoutAFileIsLost) {
+  static_cast<void>(config());
+  std::string text = directory_.read("alidade.yaml");
+  text.replace(text.find("mode: PT"), 8, "mode: OE");
+  const auto errors_of = [this, &text](const std::string& more) {
+    const std::string file = directory_.write("oe.yaml", text + more);
+    const Result result = alidade({"run", "-c", file, "--duration", "0.5"});
+    EXPECT_EQ(result.exit_code, 0) << result.errors;
+    return result.errors;
+  };
+  constexpr const char* kLost = "warning calibration: calibration.file is not set";
+  EXPECT_THAT(errors_of(""), HasSubstr(kLost));
+  EXPECT_THAT(errors_of("calibration: {file: kept.yaml}\n"), Not(HasSubstr(kLost)));
+  EXPECT_THAT(errors_of("calibration: {auto: false}\n"), Not(HasSubstr(kLost)));
+}
+
 TEST_F(HttpLinks, SayToCheckWhenTheyBreak) {
   Process process(command({"check", "-c", config(), "--duration", "4"}));
   ASSERT_TRUE(eventually([this] { return head_.count("GetStatus") >= 3; }));
