@@ -12,12 +12,15 @@
 
 #include "core/calibration/adjustment.h"
 #include "core/calibration/calibration_types.h"
+#include "core/calibration/depth_spread.h"
 
 namespace alidade::internal {
 
 struct Departures {
   std::vector<CalibrationCause> causes;       // the likeliest first
   GlobalMatrix error = GlobalMatrix::Zero();  // to add to the parameters' covariance
+  DepthSpread depth;                          // of different distances
+  bool depth_is_shown = false;
 };
 
 [[nodiscard]] Departures find_departures(const Adjustment& adjustment, const AdjustmentState& state,
