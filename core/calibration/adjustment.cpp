@@ -169,6 +169,9 @@ bool Adjustment::descend(const LossScales& loss, int max_steps, double tolerance
       for (std::size_t l = 0; l < x_landmark.size(); ++l) {
         promised += x_landmark[l].dot(at->g_landmark[l]);
       }
+      for (std::size_t l = 0; l < at->direction_by_nearness.size(); ++l) {
+        x_landmark[l] -= at->direction_by_nearness[l] * x_landmark[state->landmarks.size() + l][0];
+      }
       AdjustmentState candidate = *state;
       apply_step(x, x_landmark, &candidate);
       linearise(candidate, loss, &next);

@@ -1,6 +1,7 @@
 #include "core/calibration/calibrate.h"
 
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -68,13 +69,28 @@ StageStatus run(const CalibrationInput& input, const CalibrationOptions& options
   status = report(options, 0.3, "robust adjustment");
   if (!status.ok()) return status;
 
-  internal::StagedAdjustment adjustment(start, motion.noise, options, &selected);
-  adjustment.adjust_robustly();
-  result->exclusions.observations_drifting = adjustment.drifting();
-  status = report(options, 0.7, "adjustment");
-  if (!status.ok()) return status;
-  status = adjustment.adjust_on_inliers(&result->quality);
-  if (!status.ok()) return status;
+  // Wide against what is seen, so that distances are the pictures' and not the prior's.
+  constexpr double kNearnessSigmas = 20;
+  const internal::SelectedInput untouched = selected;
+  const CalibrationQuality at_first = result->quality;
+  std::optional<internal::StagedAdjustment> staged;
+  for (double nearness_sigma = 0;;) {
+    internal::StagedAdjustment& adjustment =
+        staged.emplace(start, motion.noise, options, nearness_sigma, &selected);
+    adjustment.adjust_robustly();
+    result->exclusions.observations_drifting = adjustment.drifting();
+    status = report(options, nearness_sigma > 0 ? 0.85 : 0.7, "adjustment");
+    if (!status.ok()) return status;
+    status = adjustment.adjust_on_inliers(&result->quality);
+    if (!status.ok()) return status;
+    if (!(adjustment.seen_nearness() > 0)) break;
+    nearness_sigma = kNearnessSigmas * adjustment.seen_nearness();
+    selected = untouched;
+    result->quality = at_first;
+    status = report(options, 0.75, "robust adjustment with distances");
+    if (!status.ok()) return status;
+  }
+  const internal::StagedAdjustment& adjustment = *staged;
 
   internal::fill_result(input, options, clocks, start.prior, selected, adjustment.adjusted(),
                         result);

@@ -140,7 +140,12 @@ void fill_landmarks(const SelectedInput& selected, const Adjusted& adjusted,
     mark.d_b = R_base_from_anchor * state.landmarks[i];
     const Matrix2<double> turn = tangent_basis(mark.d_b).transpose() * R_base_from_anchor *
                                  tangent_basis(state.landmarks[i]);
-    mark.covariance = turn * adjusted.at.H_landmark[i].inverse() * turn.transpose();
+    Matrix2<double> covariance = adjusted.at.H_landmark[i].inverse();
+    if (!state.nearness.empty()) {
+      const Vector2<double>& c = adjusted.at.direction_by_nearness[i];
+      covariance += c * c.transpose() / adjusted.at.H_landmark[state.landmarks.size() + i](0, 0);
+    }
+    mark.covariance = turn * covariance * turn.transpose();
     landmarks.push_back(mark);
   }
   for (const auto& o : selected.data.observations) {

@@ -27,6 +27,11 @@ void DepartureScore::add(const ObservationRow& row, int first, const DepartureCo
   DepartureColumns& of_landmark = cross_landmark_[static_cast<std::size_t>(row.landmark)];
   if (of_landmark.size() == 0) of_landmark.setZero(2, score_.size());
   of_landmark.middleCols(first, columns) += row.J_landmark.transpose() * X;
+  if (at_->direction_by_nearness.empty()) return;
+  DepartureColumns& of_nearness =
+      cross_landmark_[at_->direction_by_nearness.size() + static_cast<std::size_t>(row.landmark)];
+  if (of_nearness.size() == 0) of_nearness.setZero(2, score_.size());
+  of_nearness.row(0).segment(first, columns) += row.J_nearness.transpose() * X;
 }
 
 void DepartureScore::add(const TelemetryRow& row, int first, const DepartureColumns& X) {

@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "core/calibration/centre_frame.h"
 #include "core/calibration/chance.h"
 #include "core/calibration/departure_score.h"
 #include "core/calibration/depth_spread.h"
@@ -284,6 +285,27 @@ FifthOrder fifth_order(const AdjustmentState& state, double information, double 
   return out;
 }
 
+CalibrationCause cause_of(const DepthSpread& spread) {
+  return {"different distances", spread.excess, spread.landmarks, 1e3 * spread.sigma,
+          "per mille of the focal length"};
+}
+
+// What all landmarks' nearness has in common: a focal length, and, of a pupil beside the optical
+// axis, a turn of the axes with camera frame and base. variance: of either.
+GlobalMatrix common_nearness(const AdjustmentState& state, const Adjustment& adjustment,
+                             double variance) {
+  Calibration of_state;
+  of_state.camera = state.camera;
+  of_state.mechanics = state.mechanics;
+  Eigen::Matrix<double, kGlobalCount, 3> moved = Eigen::Matrix<double, kGlobalCount, 3>::Zero();
+  moved(index(Parameter::kFocalLength), 0) = 1;
+  moved.block<kParameterCount, 2>(0, 1) = state.camera.focal_length * axes_by_centre(of_state);
+  for (int p = 0; p < kGlobalCount; ++p) {
+    if (adjustment.fixed()[static_cast<std::size_t>(p)]) moved.row(p).setZero();
+  }
+  return variance * moved * moved.transpose();
+}
+
 }  // namespace
 
 Departures find_departures(const Adjustment& adjustment, const AdjustmentState& state,
@@ -353,12 +375,21 @@ Departures find_departures(const Adjustment& adjustment, const AdjustmentState& 
     }
     if (!fifth_order_shows) of_fifth_order = N(kFifthOrder, kFifthOrder);
   }
-  const DepthSpread spread = depth_spread(adjustment, state, at, factor);
-  if (spread.log_chance < limit) {
-    found.causes.insert(spread.log_chance < likeliest ? found.causes.begin() : found.causes.end(),
-                        {"different distances", spread.excess, spread.landmarks, 1e3 * spread.sigma,
-                         "per mille of the focal length"});
-    add_to_focal_length(std::pow(kCommonDepth * spread.sigma, 2));
+  if (!state.nearness.empty()) {
+    found.depth = nearness_spread(state, at);
+    found.depth_is_shown = true;
+    found.causes.insert(found.causes.begin(), cause_of(found.depth));
+    found.error +=
+        common_nearness(state, adjustment, std::pow(kCommonDepth * found.depth.sigma, 2));
+  } else {
+    found.depth = depth_spread(adjustment, state, at, factor);
+    found.depth_is_shown = found.depth.log_chance < limit;
+    if (found.depth_is_shown) {
+      found.causes.insert(
+          found.depth.log_chance < likeliest ? found.causes.begin() : found.causes.end(),
+          cause_of(found.depth));
+      add_to_focal_length(std::pow(kCommonDepth * found.depth.sigma, 2));
+    }
   }
   if (found.causes.empty()) return found;
   // Residuals that have other causes no longer say that there is none of this.

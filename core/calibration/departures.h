@@ -14,6 +14,7 @@
 
 #include "core/calibration/adjustment.h"
 #include "core/calibration/calibration_types.h"
+#include "core/calibration/depth_spread.h"
 
 namespace alidade::internal {
 
@@ -23,6 +24,8 @@ struct Departures {
   // recording too, and what r^5 distortion does that no part shows.
   GlobalMatrix error = GlobalMatrix::Zero();
   GlobalMatrix hidden = GlobalMatrix::Zero();
+  DepthSpread depth;  // of different distances
+  bool depth_is_shown = false;
 };
 
 // state, at, factor: the minimum of least squares, of which adjustment has the covariance.

@@ -179,4 +179,42 @@ DepthSpread depth_spread(const Adjustment& adjustment, const AdjustmentState& st
   return spread;
 }
 
+DepthSpread nearness_spread(const AdjustmentState& state, const Linearisation& at) {
+  constexpr int kRounds = 20;
+  const std::size_t landmarks = state.nearness.size();
+  DepthSpread spread;
+  double variance = 0;
+  for (int round = 0; round < kRounds; ++round) {
+    double weights = 0;
+    double mean = 0;
+    const auto weight = [&](std::size_t l) {
+      return at.touched_begin[l] == at.touched_begin[l + 1]
+                 ? 0.0
+                 : 1 / (variance + 1 / at.H_landmark[landmarks + l](0, 0));
+    };
+    for (std::size_t l = 0; l < landmarks; ++l) {
+      weights += weight(l);
+      mean += weight(l) * state.nearness[l];
+    }
+    if (!(weights > 0)) return spread;
+    mean /= weights;
+    double excess = 0;
+    double squares = 0;
+    spread.excess = 0;
+    spread.landmarks = 0;
+    for (std::size_t l = 0; l < landmarks; ++l) {
+      const double w = weight(l);
+      if (!(w > 0)) continue;
+      const double square = std::pow(state.nearness[l] - mean, 2);
+      excess += w * w * (square - 1 / at.H_landmark[landmarks + l](0, 0));
+      squares += w * w;
+      spread.excess += square * at.H_landmark[landmarks + l](0, 0);
+      spread.landmarks += 1;
+    }
+    variance = std::max(0.0, excess / squares);
+  }
+  spread.sigma = std::sqrt(variance);
+  return spread;
+}
+
 }  // namespace alidade::internal

@@ -21,8 +21,12 @@ struct DepthSpread {
   double sigma = 0;      // standard deviation of rho o (no unit), separate and over the scene
 };
 
-// state, at, factor: the minimum of least squares.
+// state, at, factor: the minimum of least squares, without nearness in the state.
 [[nodiscard]] DepthSpread depth_spread(const Adjustment& adjustment, const AdjustmentState& state,
                                        const Linearisation& at, const ReducedFactor& factor);
+
+// With it: that of the landmarks' nearness, which the adjustment has found; excess: its chi-square;
+// log_chance: 0.
+[[nodiscard]] DepthSpread nearness_spread(const AdjustmentState& state, const Linearisation& at);
 
 }  // namespace alidade::internal

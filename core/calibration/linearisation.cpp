@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/calibration/nearness_columns.h"
+
 namespace alidade::internal {
 
 namespace {
@@ -46,23 +48,25 @@ struct ObservationModel {
     Vector2<double> error;
     Matrix2<double> J_angle;  // of the projection, like the following
     Matrix2<double> J_landmark;
+    Vector2<double> J_nearness;
     CameraJacobian J_camera;
   };
 
   // Error and derivatives in units of sigma. row: if not null, its last four members too.
   [[nodiscard]] bool evaluate(const AdjustmentObservation& observation,
                               const PanTilt<double>& angle, const PanTilt<double>& rate,
-                              const Landmark& landmark, Result* out,
+                              const Landmark& landmark, double nearness, Result* out,
                               ObservationRow* row = nullptr) const {
     Matrix<double, 3, 2> J_xi_angle;
     Matrix<double, 3, 4> J_xi_axes;
     const Matrix3<double> R = R_base_from_camera(mechanics, angle, &J_xi_angle, &J_xi_axes);
-    const Vector3<double> d_c = R.transpose() * landmark.d_b;
+    const Vector3<double> d_far = R.transpose() * landmark.d_b;
+    const Vector3<double> d_c = d_far - nearness * Vector3<double>::UnitZ();
     Vector2<double> u;
     Matrix<double, 2, 3> J_u_dc;
     Matrix<double, 2, kCameraParameterCount> J_u_camera;
     if (project(camera, d_c, &u, &J_u_dc, &J_u_camera) != ProjectionStatus::kOk) return false;
-    const Matrix<double, 2, 3> J_u_xi = J_u_dc * skew(d_c);
+    const Matrix<double, 2, 3> J_u_xi = J_u_dc * skew(d_far);
     const Matrix2<double> J_u_angle = J_u_xi * J_xi_angle;
     const Vector2<double> J_u_time = J_u_angle * rate.vector();
     const Vector2<double> J_u_row = J_u_time * line_delay;
@@ -75,6 +79,7 @@ struct ObservationModel {
     out->J_angle = whiten * J_u_angle;
     const Matrix<double, 2, 3> J_u_db = J_u_dc * R.transpose();
     out->J_landmark = whiten * (J_u_db * landmark.J_db_landmark);
+    out->J_nearness = -(whiten * J_u_dc.col(2));
     CameraJacobian J;
     J.col(camera_column::kFocalLength) = by_zoom(camera, J_u_camera);
     J.col(camera_column::kAspect) = camera.aspect * J_u_camera.col(camera_column::kAspect);
@@ -95,6 +100,10 @@ struct ObservationModel {
     return true;
   }
 };
+
+double nearness_of(const AdjustmentState& state, int landmark) {
+  return state.nearness.empty() ? 0 : state.nearness[static_cast<std::size_t>(landmark)];
+}
 
 struct RobustCost {
   double cost;
@@ -161,9 +170,11 @@ void apply_step(const Eigen::VectorXd& x, const std::vector<Vector2<double>>& x_
   mechanics.tilt_scale += global[index(Parameter::kTiltScale)];
   state->shift_s += global[index(Parameter::kClockOffset)];
   state->drift += global[kDrift];
-  for (std::size_t i = 0; i < x_landmark.size(); ++i) {
+  for (std::size_t i = 0; i < state->landmarks.size(); ++i) {
     state->landmarks[i] = direction_plus<double>(state->landmarks[i], x_landmark[i]).normalized();
   }
+  for (std::size_t i = 0; i < state->nearness.size(); ++i)
+    state->nearness[i] += x_landmark[state->landmarks.size() + i][0];
   mechanics.pan_axis.normalize();
   mechanics.tilt_axis.normalize();
 }
@@ -194,6 +205,8 @@ void Lineariser::add_observations(const AdjustmentState& state, const LossScales
   out->touched.clear();
   out->H_touched.clear();
   out->touched_begin.assign(1, 0);
+  out->direction_by_nearness.clear();
+  out->nearness_unknowns = 0;
   touched_buffer_.assign(static_cast<std::size_t>(trajectory.control_points()),
                          Matrix2<double>::Zero());
   is_touched_.assign(static_cast<std::size_t>(trajectory.control_points()), false);
@@ -203,9 +216,12 @@ void Lineariser::add_observations(const AdjustmentState& state, const LossScales
   Eigen::Matrix<double, kObservedCount, 1> g_c;
   g_c.setZero();
   std::vector<int> touched_now;
+  NearnessColumns nearness(priors_.nearness_information);
+  const bool has_nearness = !state.nearness.empty();
   std::size_t next = 0;
   for (std::size_t l = 0; l < landmarks; ++l) {
     const ObservationModel::Landmark landmark = model.turn(state.landmarks[l]);
+    if (has_nearness) nearness.begin(state.nearness[l], trajectory.control_points());
     int segment = 0;
     for (; next < data_.observations.size() &&
            data_.observations[next].landmark == static_cast<int>(l);
@@ -219,7 +235,7 @@ void Lineariser::add_observations(const AdjustmentState& state, const LossScales
       segment = basis.segment;
       ObservationModel::Result result;
       if (!model.evaluate(observation, trajectory.position(basis), trajectory.rate(basis), landmark,
-                          &result)) {
+                          nearness_of(state, observation.landmark), &result)) {
         if (!observation.used) continue;
         out->cost += robust_cost(kLostSquaredError, loss.pixel).cost;
         if (std::isinf(loss.pixel)) out->valid = false;
@@ -256,6 +272,10 @@ void Lineariser::add_observations(const AdjustmentState& state, const LossScales
       out->H_landmark[l] += Jt_landmark * result.J_landmark;
       out->g_landmark[l] += Jt_landmark * result.error;
       out->H_camera[l] += (Jt_landmark * result.J_camera).transpose();
+      if (has_nearness) {
+        nearness.add(basis, robust.weight, result.error, result.J_angle, result.J_landmark,
+                     result.J_nearness, result.J_camera);
+      }
     }
     std::sort(touched_now.begin(), touched_now.end());
     for (const int point : touched_now) {
@@ -266,7 +286,9 @@ void Lineariser::add_observations(const AdjustmentState& state, const LossScales
     }
     touched_now.clear();
     out->touched_begin.push_back(out->touched.size());
+    if (has_nearness) nearness.end(l, out);
   }
+  if (has_nearness) nearness.append_to(out);
   out->H.border().block<kObservedCount, kObservedCount>(0, camera_row) += H_cc;
   out->g.segment<kObservedCount>(camera_row) += g_c;
 }
@@ -276,17 +298,24 @@ std::vector<Influence> Lineariser::influences(const AdjustmentState& state, cons
   const ObservationModel model(state);
   const Eigen::Matrix<double, kGlobalCount, kObservedCount> of_camera =
       inverse.middleCols<kObservedCount>(inverse.cols() - kGlobalCount);
+  const bool has_nearness = !state.nearness.empty();
   std::vector<Influence> all(data_.observations.size(), Influence::Zero());
   for (std::size_t i = 0; i < all.size();) {
     const int name = data_.observations[i].landmark;
     const auto l = static_cast<std::size_t>(name);
     const ObservationModel::Landmark landmark = model.turn(state.landmarks[l]);
-    // The part that the landmark's direction absorbs.
-    Influence of_landmark = of_camera * at.H_camera[l];
-    for (std::size_t j = at.touched_begin[l]; j < at.touched_begin[l + 1]; ++j) {
-      of_landmark += inverse.middleCols<2>(2 * at.touched[j]) * at.H_touched[j];
-    }
-    of_landmark *= at.H_landmark[l].inverse();
+    // The parts that the landmark's direction and nearness absorb.
+    const auto absorbed = [&](std::size_t block) {
+      Influence of = of_camera * at.H_camera[block];
+      for (std::size_t j = at.touched_begin[block]; j < at.touched_begin[block + 1]; ++j) {
+        of += inverse.middleCols<2>(2 * at.touched[j]) * at.H_touched[j];
+      }
+      return Influence(of * at.H_landmark[block].inverse());
+    };
+    const Influence of_landmark = absorbed(l);
+    const GlobalVector of_nearness = has_nearness
+                                         ? GlobalVector(absorbed(state.landmarks.size() + l).col(0))
+                                         : GlobalVector(GlobalVector::Zero());
     for (; i < all.size() && data_.observations[i].landmark == name; ++i) {
       const AdjustmentObservation& observation = data_.observations[i];
       if (!observation.used) continue;
@@ -295,7 +324,8 @@ std::vector<Influence> Lineariser::influences(const AdjustmentState& state, cons
           state.trajectory.basis(residual.time_s, residual.segment);
       ObservationModel::Result result;
       if (!model.evaluate(observation, state.trajectory.position(basis),
-                          state.trajectory.rate(basis), landmark, &result)) {
+                          state.trajectory.rate(basis), landmark, nearness_of(state, name),
+                          &result)) {
         continue;
       }
       Influence of_angle = Influence::Zero();
@@ -304,6 +334,10 @@ std::vector<Influence> Lineariser::influences(const AdjustmentState& state, cons
       }
       all[i] = of_angle * result.J_angle.transpose() + of_camera * result.J_camera.transpose() -
                of_landmark * result.J_landmark.transpose();
+      if (has_nearness) {
+        all[i] -= of_nearness *
+                  (result.J_nearness - result.J_landmark * at.direction_by_nearness[l]).transpose();
+      }
     }
   }
   return all;
@@ -322,8 +356,8 @@ void Lineariser::visit(const AdjustmentState& state, const Linearisation& at,
     row.basis = trajectory.basis(row.time_s, at.observations[i].segment);
     ObservationModel::Result result;
     if (!model.evaluate(o, trajectory.position(row.basis), trajectory.rate(row.basis),
-                        model.turn(state.landmarks[static_cast<std::size_t>(o.landmark)]), &result,
-                        &row)) {
+                        model.turn(state.landmarks[static_cast<std::size_t>(o.landmark)]),
+                        nearness_of(state, o.landmark), &result, &row)) {
       continue;
     }
     row.index = i;
@@ -331,6 +365,12 @@ void Lineariser::visit(const AdjustmentState& state, const Linearisation& at,
     row.error = result.error;
     row.J_angle = result.J_angle;
     row.J_landmark = result.J_landmark;
+    row.J_nearness.setZero();
+    if (!state.nearness.empty()) {
+      row.J_nearness =
+          result.J_nearness -
+          result.J_landmark * at.direction_by_nearness[static_cast<std::size_t>(o.landmark)];
+    }
     row.J_camera = result.J_camera;
     observation(row);
   }

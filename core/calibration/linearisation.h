@@ -70,6 +70,9 @@ struct AdjustmentState {
   // of all landmarks.
   PanTilt<double> anchor;
   std::vector<Vector3<double>> landmarks;
+  // Of each landmark: the pupil's place before the axes over the landmark's distance, less what all
+  // have in common, which is part of the focal length. d_c is nearer by it. Empty: none has any.
+  std::vector<double> nearness;
 
   // The camera with the distortion that corner_distortion means.
   [[nodiscard]] Camera<double> physical_camera() const;
@@ -81,6 +84,7 @@ struct AdjustmentState {
 struct AdjustmentPriors {
   AdjustmentState mean;  // its trajectory and landmarks are unused
   GlobalVector information = GlobalVector::Zero();
+  double nearness_information = 0;  // of each landmark, about 0; where the state has it
 };
 
 // Cauchy: rho(x) = c^2 log(1 + x / c^2). The scales c count sigmas; infinite scales give least
@@ -112,7 +116,9 @@ struct Linearisation {
   NormalMatrix H;
   NormalMatrix H_telemetry;  // the telemetry's part of H
   Eigen::VectorXd g;
-  // Landmarks: H_ll, g_l, and rows of H_cl for the touched control points and the camera.
+  // Landmarks: H_ll, g_l, and rows of H_cl for the touched control points and the camera. Where the
+  // state has nearness, as many follow again: that of each, with its direction eliminated (the
+  // second unknown of these is none).
   std::vector<Matrix2<double>> H_landmark;
   std::vector<Vector2<double>> g_landmark;
   // Landmark l touches the control points touched[touched_begin[l]] to before
@@ -121,6 +127,9 @@ struct Linearisation {
   std::vector<int> touched;
   std::vector<Matrix2<double>> H_touched;
   std::vector<Eigen::Matrix<double, kObservedCount, 2>> H_camera;
+  // By each landmark's nearness; empty: none. Its direction's best change, negative.
+  std::vector<Vector2<double>> direction_by_nearness;
+  double nearness_unknowns = 0;  // number that the observations determine
 };
 
 // The parameters' rows of H^-1, with landmarks eliminated; as many columns as H.
@@ -149,6 +158,7 @@ struct ObservationRow {
   Vector2<double> error;
   Matrix2<double> J_angle;
   Matrix2<double> J_landmark;
+  Vector2<double> J_nearness;  // with the landmark's direction eliminated; 0 where there is none
   Eigen::Matrix<double, 2, kObservedCount> J_camera;
   Matrix2<double> whiten;       // A^-1 / sigma: from a displacement in px to units of sigma
   Vector3<double> d_c;          // unit direction of the landmark
@@ -169,7 +179,7 @@ struct TelemetryRow {
 };
 
 // Adds a solution of the normal equations to the state: x to trajectory and parameters, x_landmark
-// to the landmarks' directions.
+// to the landmarks' directions and, behind these, to their nearness, if there is any.
 void apply_step(const Eigen::VectorXd& x, const std::vector<Vector2<double>>& x_landmark,
                 AdjustmentState* state);
 

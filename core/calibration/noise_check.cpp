@@ -46,8 +46,8 @@ NoiseRatios noise_ratios(const AdjustmentData& data, const AdjustmentState& stat
   const double landmarks = std::accumulate(seen.begin(), seen.end(), 0.0);
   const double unknowns = 2 * state.trajectory.control_points() + kGlobalCount;
   const double telemetry_redundancy = angles - telemetry_unknowns;
-  const double pixel_redundancy =
-      2 * observations - 2 * landmarks - std::max(0.0, unknowns - telemetry_unknowns);
+  const double pixel_redundancy = 2 * observations - 2 * landmarks - at.nearness_unknowns -
+                                  std::max(0.0, unknowns - telemetry_unknowns);
   return {ratio_of(pixel_squares, pixel_redundancy),
           ratio_of(telemetry_squares, telemetry_redundancy)};
 }
@@ -61,6 +61,7 @@ double repetition(const AdjustmentData& data, std::size_t landmarks, const Linea
   };
   std::vector<std::vector<Seen>> tracks(landmarks);
   double observations = 0;
+  const double unknowns = at.direction_by_nearness.empty() ? 2 : 3;
   for (std::size_t i = 0; i < data.observations.size(); ++i) {
     const auto& o = data.observations[i];
     if (!o.used) continue;
@@ -73,7 +74,8 @@ double repetition(const AdjustmentData& data, std::size_t landmarks, const Linea
     std::sort(track.begin(), track.end(),
               [](const Seen& a, const Seen& b) { return a.frame < b.frame; });
     // The landmark's direction absorbed the mean of both components: each product lacks 1 / size.
-    const double taken = track.empty() ? 0 : 2.0 / static_cast<double>(track.size());
+    // Nearness absorbed as much as one more.
+    const double taken = track.empty() ? 0 : unknowns / static_cast<double>(track.size());
     for (std::size_t i = 0; i < track.size(); ++i) {
       for (std::size_t j = i + 1; j < track.size(); ++j) {
         const auto apart = static_cast<std::size_t>(track[j].frame - track[i].frame);

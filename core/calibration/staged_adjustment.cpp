@@ -64,6 +64,11 @@ int leave_out(const std::vector<char>& out, SelectedInput* selected,
   return left_out;
 }
 
+AdjustmentPriors with_nearness(AdjustmentPriors priors, double sigma) {
+  priors.nearness_information = sigma > 0 ? 1 / (sigma * sigma) : 0;
+  return priors;
+}
+
 std::string drift_text(DriftFinding finding, double px_s) {
   char text[400];
   std::snprintf(text, sizeof text,
@@ -80,14 +85,17 @@ std::string drift_text(DriftFinding finding, double px_s) {
 }  // namespace
 
 StagedAdjustment::StagedAdjustment(const StartValues& start, const TelemetryAngleNoise& noise,
-                                   const CalibrationOptions& options, SelectedInput* selected)
+                                   const CalibrationOptions& options, double nearness_sigma,
+                                   SelectedInput* selected)
     : selected_(selected),
       noise_(noise),
       max_knots_(options.max_knots),
       centre_sigma_px_(options.centre_sigma_px),
       doubt_(start.doubt),
-      adjustment_(selected->data, start.prior.priors, start.prior.fixed),
-      departures_(start.prior.fixed, noise.resolution_rad, options.angle_accuracy_rad) {
+      adjustment_(selected->data, with_nearness(start.prior.priors, nearness_sigma),
+                  start.prior.fixed),
+      departures_(start.prior.fixed, noise.resolution_rad, options.angle_accuracy_rad),
+      nearness_sigma_(nearness_sigma) {
   start_ = start.state;
   adjusted_.state = start.state;
 }
@@ -95,6 +103,10 @@ StagedAdjustment::StagedAdjustment(const StartValues& start, const TelemetryAngl
 void StagedAdjustment::adjust_robustly() {
   settled_ = settle_robustly();
   if (leave_out_drifting()) settled_ = settle_robustly();
+  if (nearness_sigma_ > 0) {
+    give_nearness();
+    settled_ = settle_robustly();
+  }
   if (settled_ && noise_.resolution_rad > 0) {
     replace_rounded_telemetry();
     settled_ = settle_robustly();
@@ -181,6 +193,12 @@ bool StagedAdjustment::leave_out_drifting() {
   drifting_ = leave_out(found.drifts, selected_, {&start_, &adjusted_.state});
   adjusted_.state = start_;
   return true;
+}
+
+// What it contradicted may have made knots where none are needed: begins anew.
+void StagedAdjustment::give_nearness() {
+  start_.nearness.assign(start_.landmarks.size(), 0);
+  adjusted_.state = start_;
 }
 
 bool StagedAdjustment::settle_on_inliers() {
@@ -355,6 +373,7 @@ void StagedAdjustment::allow_for_contradictions(CalibrationQuality* quality) {
   const Departures departures =
       find_departures(adjustment_, adjusted_.state, adjusted_.at, factor, lens_growth);
   quality->causes = departures.causes;
+  if (departures.depth_is_shown && nearness_sigma_ == 0) seen_nearness_ = departures.depth.sigma;
   adjusted_.covariance += departures.error;
   hidden_ = departures.hidden;
   // What landmarks and frames have in common is part of what parts show.

@@ -26,8 +26,10 @@ class StagedAdjustment {
  public:
   // *selected must outlive this object. The adjustment sets outliers, noise and crossings in it and
   // subtracts departures from its telemetry.
+  // nearness_sigma: of the prior of each landmark's nearness (AdjustmentState); 0: none has any.
   StagedAdjustment(const StartValues& start, const TelemetryAngleNoise& noise,
-                   const CalibrationOptions& options, SelectedInput* selected);
+                   const CalibrationOptions& options, double nearness_sigma,
+                   SelectedInput* selected);
 
   // Cauchy loss, whose scale follows the medians of the residuals, down to 3 sigmas. Splits
   // segments of the spline if the residuals ask for it (knot_choice.h). Leaves out what drifts, and
@@ -46,12 +48,15 @@ class StagedAdjustment {
 
   // After adjust_on_inliers() returned ok.
   [[nodiscard]] const Adjusted& adjusted() const { return adjusted_; }
+  // What adjust_on_inliers() saw of different distances, where nearness_sigma is 0; 0: nothing.
+  [[nodiscard]] double seen_nearness() const { return seen_nearness_; }
   // The number of observations that were left out because they drift.
   [[nodiscard]] int drifting() const { return drifting_; }
 
  private:
   [[nodiscard]] bool settle_robustly();
   [[nodiscard]] bool leave_out_drifting();
+  void give_nearness();
   [[nodiscard]] bool settle_on_inliers();
   [[nodiscard]] bool settle_departures();
   [[nodiscard]] bool settle_known_departures();
@@ -83,6 +88,8 @@ class StagedAdjustment {
   DriftFinding drift_ = DriftFinding::kNone;
   double drift_px_s_ = 0;
   int drifting_ = 0;  // observations
+  double nearness_sigma_;
+  double seen_nearness_ = 0;
 };
 
 }  // namespace alidade::internal
