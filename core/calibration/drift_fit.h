@@ -4,7 +4,7 @@
 //   error = J_angle p(t) + J_camera g + J_landmark d_l + J_angle w_l (t - t_l) + noise.
 // Trajectory, parameters and landmarks are solved for; telemetry and priors count as ever, so that
 // drifts are against telemetry. Observations that fit no drift count less, as in telemetry_fit.h.
-// Rates in rad/s. Allocates.
+// A landmark may also have a drift that is known, as a part of a group. Rates in rad/s. Allocates.
 
 #include <Eigen/Core>
 #include <array>
@@ -14,6 +14,12 @@
 #include "core/calibration/linearisation.h"
 
 namespace alidade::internal {
+
+enum class TrackMotion : char {
+  kFree,    // a drift of its own
+  kAtRest,  // none
+  kShared   // the group's
+};
 
 class DriftFit {
  public:
@@ -35,9 +41,10 @@ class DriftFit {
   // over the frames.
   DriftFit(AdjustmentData* data, const AdjustmentState& state, Adjustment* adjustment);
 
-  // Solves with drifts for landmarks that are not at rest, and sets each track's rate. Returns the
-  // sum of squares at the minimum, less that of zero unknowns; nothing if it has no minimum.
-  [[nodiscard]] bool solve(const std::vector<char>& at_rest, double* cost);
+  // Solves with these motions, and sets the rate that each track would have if it were free. *cost:
+  // the sum of squares at the minimum, less that of zero unknowns. False if it has no minimum.
+  [[nodiscard]] bool solve(const std::vector<TrackMotion>& motions,
+                           const Vector2<double>& shared_rate, double* cost);
 
   [[nodiscard]] const std::vector<Track>& tracks() const { return tracks_; }  // by landmark
 
