@@ -64,11 +64,11 @@ DriftFit::DriftFit(AdjustmentData* data, const AdjustmentState& state, Adjustmen
   find_tracks();
 
   constexpr int kRounds = 3;
-  const std::vector<char> none(tracks_.size(), 0);
+  const std::vector<TrackMotion> free(tracks_.size(), TrackMotion::kFree);
   double cost = 0;
   for (int round = 0; round <= kRounds; ++round) {
     form_equations();
-    if (round == kRounds || !solve(none, &cost)) break;
+    if (round == kRounds || !solve(free, Vector2<double>::Zero(), &cost)) break;
     weigh();
   }
 }
@@ -128,7 +128,8 @@ void DriftFit::form_equations() {
   }
 }
 
-bool DriftFit::solve(const std::vector<char>& at_rest, double* cost) {
+bool DriftFit::solve(const std::vector<TrackMotion>& motions, const Vector2<double>& shared_rate,
+                     double* cost) {
   Eigen::MatrixXd S = normal_;
   Eigen::VectorXd g = gradient_;
   const Eigen::Index first_global = S.rows() - kGlobalCount;
@@ -136,14 +137,22 @@ bool DriftFit::solve(const std::vector<char>& at_rest, double* cost) {
   for (std::size_t l = 0; l < tracks_.size(); ++l) {
     const Track& track = tracks_[l];
     if (track.observations < 2) continue;
-    const Eigen::Index unknowns = at_rest[l] != 0 ? 2 : 4;
+    const Eigen::Index unknowns = motions[l] == TrackMotion::kFree ? 4 : 2;
     const Eigen::LLT<Eigen::MatrixXd> llt(track.normal.topLeftCorner(unknowns, unknowns));
     if (llt.info() != Eigen::Success) continue;
+    Vector4<double> of_track = track.gradient;
+    Eigen::VectorXd known = Eigen::VectorXd::Zero(track.cross.rows());
+    if (motions[l] == TrackMotion::kShared) {
+      of_track -= track.normal.rightCols<2>() * shared_rate;
+      known = track.cross.rightCols<2>() * shared_rate;
+      gained += 2 * shared_rate.dot(track.gradient.tail<2>()) -
+                shared_rate.dot(track.normal.bottomRightCorner<2, 2>() * shared_rate);
+    }
     const Eigen::MatrixXd Y = llt.matrixL().solve(track.cross.leftCols(unknowns).transpose());
-    const Eigen::VectorXd y = llt.matrixL().solve(track.gradient.head(unknowns));
+    const Eigen::VectorXd y = llt.matrixL().solve(of_track.head(unknowns));
     gained += y.squaredNorm();
     const Eigen::MatrixXd square = Y.transpose() * Y;
-    const Eigen::VectorXd linear = Y.transpose() * y;
+    const Eigen::VectorXd linear = Y.transpose() * y + known;
     for_each_place(track.points, first_global, [&](Eigen::Index a, Eigen::Index row, int rows) {
       g.segment(row, rows) -= linear.segment(a, rows);
       for_each_place(track.points, first_global,

@@ -4,7 +4,8 @@
 //   error = J_angle p(t) + J_camera g + J_landmark d_l + J_angle w_l (t - t_l) + noise.
 // Trajectory p, parameters g, landmarks d_l and rates are solved for. Telemetry and priors count as
 // in the adjustment: a drift is against telemetry. Observations that fit no drift count less, as in
-// telemetry_fit.h. Times s on the image clock, rates rad/s. Allocates.
+// telemetry_fit.h. A landmark may also have a known drift, as a part of a group. Times s on the
+// image clock, rates rad/s. Allocates.
 
 #include <Eigen/Core>
 #include <array>
@@ -14,6 +15,12 @@
 #include "core/calibration/linearisation.h"
 
 namespace alidade::internal {
+
+enum class TrackMotion : char {
+  kFree,    // a drift of its own
+  kAtRest,  // none
+  kShared   // the group's
+};
 
 class DriftFit {
  public:
@@ -36,10 +43,11 @@ class DriftFit {
   // Borrows nothing after the call.
   DriftFit(AdjustmentData* data, const AdjustmentState& state, Adjustment* adjustment);
 
-  // Solves with a drift for each landmark that is not at rest, and sets each track's rate. at_rest:
-  // by landmark, 0 or 1. *cost: the sum of squares at the minimum minus that of zero unknowns.
-  // False: there is no minimum.
-  [[nodiscard]] bool solve(const std::vector<char>& at_rest, double* cost);
+  // Solves with these motions, one of each landmark, and sets the rate that each track would have if
+  // it were free. *cost: the sum of squares at the minimum minus that of zero unknowns. False: there
+  // is no minimum.
+  [[nodiscard]] bool solve(const std::vector<TrackMotion>& motions,
+                           const Vector2<double>& shared_rate, double* cost);
 
   [[nodiscard]] const std::vector<Track>& tracks() const { return tracks_; }  // by landmark
 

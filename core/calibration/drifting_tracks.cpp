@@ -36,6 +36,8 @@ class DriftFinder {
   static constexpr double kLeastShare = 0.1;      // of a window's tracks
   static constexpr std::size_t kMostGroups = 4;   // of a window
   static constexpr double kGate = 13.8;           // 99.9 % of chi-square, two degrees of freedom
+  static constexpr double kTold = 9;              // difference of chi-squares of rest and drift
+  static constexpr double kSteadiness = 0.2;      // of a group's rate
   static constexpr double kUnmodelled_px = 0.05;  // over a track's life, in its place
   static constexpr double kPerFreeTrack = 6;      // what freeing a track costs, of its two unknowns
   static constexpr double kSure = 50;             // difference of sums of squares
@@ -45,7 +47,8 @@ class DriftFinder {
 
   struct Hypothesis {
     bool holds = false;
-    std::vector<char> at_rest;
+    std::vector<TrackMotion> motions;
+    Vector2<double> shared_rate = Vector2<double>::Zero();
     double cost = std::numeric_limits<double>::infinity();  // with what free tracks cost
     std::vector<Vector2<double>> rates;
     std::vector<Matrix2<double>> covariances;
@@ -69,11 +72,21 @@ class DriftFinder {
   }
   void find_windows();
   void find_groups(Window* window) const;
-  [[nodiscard]] Hypothesis settle(std::vector<char> at_rest);
+  // chi-square of the track's rate less this one. slack: of that, one standard deviation.
+  [[nodiscard]] double square_from(const Vector2<double>& rate, double slack,
+                                   const Track& track) const;
+  // By what the track's rate is now.
+  [[nodiscard]] TrackMotion motion_of(const Track& track, bool grouped,
+                                      const Vector2<double>& shared_rate) const;
+  // grouped: some move as one.
+  [[nodiscard]] Hypothesis settle(std::vector<TrackMotion> motions, bool grouped,
+                                  Vector2<double> shared_rate);
   template <class Choose>
-  [[nodiscard]] std::vector<char> chosen(Choose choose) const;
+  [[nodiscard]] std::vector<TrackMotion> chosen(Choose choose) const;
+  [[nodiscard]] std::vector<TrackMotion> consistent(const Vector2<double>& shared_rate) const;
   [[nodiscard]] bool all_drift(Vector2<double>* rate) const;
   [[nodiscard]] Group coherent(const Hypothesis& hypothesis) const;
+  void mark(const Hypothesis& hypothesis, DriftingTracks* out) const;
 
   DriftFit fit_;
   double pixel_rad_;
@@ -163,40 +176,97 @@ void DriftFinder::find_groups(Window* window) const {
 }
 
 template <class Choose>
-std::vector<char> DriftFinder::chosen(Choose choose) const {
-  std::vector<char> at_rest(fit_.tracks().size(), 0);
+std::vector<TrackMotion> DriftFinder::chosen(Choose choose) const {
+  std::vector<TrackMotion> motions(fit_.tracks().size(), TrackMotion::kFree);
   for (const Window& window : windows_) {
-    for (const std::size_t l : window.groups[choose(window)].tracks) at_rest[l] = 1;
+    for (const std::size_t l : window.groups[choose(window)].tracks) {
+      motions[l] = TrackMotion::kAtRest;
+    }
   }
-  return at_rest;
+  return motions;
+}
+
+// In each window at most one group is at rest, and the others have that rate, as nearly as may be:
+// where clouds are all that is in view, they drift there, too.
+std::vector<TrackMotion> DriftFinder::consistent(const Vector2<double>& shared_rate) const {
+  std::vector<TrackMotion> motions(fit_.tracks().size(), TrackMotion::kFree);
+  const double most = shared_rate.squaredNorm();
+  for (const Window& window : windows_) {
+    const auto misfit = [&](std::size_t at_rest) {
+      double sum = 0;
+      for (std::size_t g = 0; g < window.groups.size(); ++g) {
+        const Vector2<double>& rate = window.groups[g].rate;
+        sum +=
+            g == at_rest ? rate.squaredNorm() : std::min(most, (rate - shared_rate).squaredNorm());
+      }
+      return sum;
+    };
+    std::size_t best = window.groups.size();  // none
+    for (std::size_t g = 0; g < window.groups.size(); ++g) {
+      if (misfit(g) < misfit(best)) best = g;
+    }
+    for (std::size_t g = 0; g < window.groups.size(); ++g) {
+      const Vector2<double> apart = window.groups[g].rate - shared_rate;
+      if (g != best && apart.squaredNorm() > 0.25 * most) continue;
+      for (const std::size_t l : window.groups[g].tracks) {
+        motions[l] = g == best ? TrackMotion::kAtRest : TrackMotion::kShared;
+      }
+    }
+  }
+  return motions;
+}
+
+double DriftFinder::square_from(const Vector2<double>& rate, double slack,
+                                const Track& track) const {
+  const Matrix2<double> covariance =
+      covariance_of(track) + slack * slack * Matrix2<double>::Identity();
+  const Vector2<double> apart = track.rate - rate;
+  return apart.dot(covariance.inverse() * apart);
+}
+
+TrackMotion DriftFinder::motion_of(const Track& track, bool grouped,
+                                   const Vector2<double>& shared_rate) const {
+  const double of_rest =
+      track.observations < kLeastObservations ? 0 : square_from(Vector2<double>::Zero(), 0, track);
+  if (!grouped) return of_rest < kGate ? TrackMotion::kAtRest : TrackMotion::kFree;
+  const double of_drift = square_from(shared_rate, kSteadiness * shared_rate.norm(), track);
+  if (std::min(of_rest, of_drift) >= kGate) return TrackMotion::kFree;
+  return of_rest < of_drift ? TrackMotion::kAtRest : TrackMotion::kShared;
 }
 
 // What is at rest with the others is at rest; until that stays.
-DriftFinder::Hypothesis DriftFinder::settle(std::vector<char> at_rest) {
+DriftFinder::Hypothesis DriftFinder::settle(std::vector<TrackMotion> motions, bool grouped,
+                                            Vector2<double> shared_rate) {
   constexpr int kRounds = 6;
   Hypothesis out;
   for (int round = 0; round < kRounds; ++round) {
     double cost = 0;
-    if (!fit_.solve(at_rest, &cost)) return {};
-    out.at_rest = at_rest;
+    if (!fit_.solve(motions, shared_rate, &cost)) return {};
+    out.motions = motions;
+    out.shared_rate = shared_rate;
     out.cost = cost;
     out.rates.clear();
     out.covariances.clear();
     int rest = 0;
     bool changed = false;
-    for (std::size_t l = 0; l < at_rest.size(); ++l) {
+    Matrix2<double> information = Matrix2<double>::Zero();
+    Vector2<double> sum = Vector2<double>::Zero();
+    for (std::size_t l = 0; l < motions.size(); ++l) {
       const Track& track = fit_.tracks()[l];
       const Matrix2<double> covariance = covariance_of(track);
       out.rates.push_back(track.rate);
       out.covariances.push_back(covariance);
-      const bool rests = track.observations < kLeastObservations ||
-                         track.rate.dot(covariance.inverse() * track.rate) < kGate;
-      out.cost += at_rest[l] != 0 ? 0 : kPerFreeTrack;
-      rest += rests ? 1 : 0;
-      changed = changed || rests != (at_rest[l] != 0);
-      at_rest[l] = rests ? 1 : 0;
+      const TrackMotion motion = motion_of(track, grouped, shared_rate);
+      out.cost += motions[l] == TrackMotion::kFree ? kPerFreeTrack : 0;
+      rest += motion == TrackMotion::kAtRest ? 1 : 0;
+      changed = changed || motion != motions[l];
+      motions[l] = motion;
+      if (motion != TrackMotion::kShared || !shows_rate(track)) continue;
+      information += covariance.inverse();
+      sum += covariance.inverse() * track.rate;
     }
     if (rest < static_cast<int>(kLeastGroup)) return {};
+    if (information(0, 0) > 0) shared_rate = information.inverse() * sum;
     if (!changed) break;
   }
   out.holds = true;
@@ -207,7 +277,8 @@ DriftFinder::Hypothesis DriftFinder::settle(std::vector<char> at_rest) {
 DriftFinder::Group DriftFinder::coherent(const Hypothesis& hypothesis) const {
   std::vector<std::size_t> moving;
   for (std::size_t l = 0; l < fit_.tracks().size(); ++l) {
-    if (hypothesis.at_rest[l] == 0 && shows_rate(fit_.tracks()[l])) moving.push_back(l);
+    if (hypothesis.motions[l] != TrackMotion::kAtRest && shows_rate(fit_.tracks()[l]))
+      moving.push_back(l);
   }
   Group group;
   if (moving.size() < kLeastGroup) return group;
@@ -218,7 +289,7 @@ DriftFinder::Group DriftFinder::coherent(const Hypothesis& hypothesis) const {
     tilt.push_back(hypothesis.rates[l].y());
   }
   group.rate = {median(pan), median(tilt)};
-  const double slack = 0.2 * group.rate.norm();
+  const double slack = kSteadiness * group.rate.norm();
   for (const std::size_t l : moving) {
     const Vector2<double> apart = hypothesis.rates[l] - group.rate;
     const Matrix2<double> covariance =
@@ -250,11 +321,26 @@ bool DriftFinder::all_drift(Vector2<double>* rate) const {
          mean.norm() > kMuch * std::sqrt(2 * square / count);
 }
 
+// Left out is what is not at rest, and what may as well drift with the group.
+void DriftFinder::mark(const Hypothesis& hypothesis, DriftingTracks* out) const {
+  const double slack = kSteadiness * hypothesis.shared_rate.norm();
+  for (std::size_t l = 0; l < fit_.tracks().size(); ++l) {
+    const Track& track = fit_.tracks()[l];
+    const double of_rest = square_from(Vector2<double>::Zero(), 0, track);
+    const bool rests = hypothesis.motions[l] == TrackMotion::kAtRest &&
+                       track.observations >= kLeastObservations &&
+                       square_from(hypothesis.shared_rate, slack, track) - of_rest > kTold;
+    out->drifts[l] = rests ? 0 : 1;
+    out->count += out->drifts[l];
+  }
+}
+
 DriftingTracks DriftFinder::find() {
   DriftingTracks out;
   out.drifts.assign(fit_.tracks().size(), 0);
   double cost = 0;
-  if (!fit_.solve(out.drifts, &cost)) return out;
+  const std::vector<TrackMotion> free(fit_.tracks().size(), TrackMotion::kFree);
+  if (!fit_.solve(free, Vector2<double>::Zero(), &cost)) return out;
   find_windows();
   if (windows_.empty()) return out;
   const bool split = std::any_of(windows_.begin(), windows_.end(),
@@ -274,7 +360,7 @@ DriftingTracks DriftFinder::find() {
   }
   Hypothesis best;
   for (const auto& start : {chosen(largest), chosen(second), chosen(slowest)}) {
-    Hypothesis hypothesis = settle(start);
+    Hypothesis hypothesis = settle(start, false, Vector2<double>::Zero());
     if (hypothesis.holds && hypothesis.cost < best.cost) best = std::move(hypothesis);
   }
   if (!best.holds) return out;
@@ -284,7 +370,7 @@ DriftingTracks DriftFinder::find() {
   for (std::size_t l = 0; l < fit_.tracks().size(); ++l) {
     if (!shows_rate(fit_.tracks()[l])) continue;
     ++shown;
-    moving += best.at_rest[l] == 0 ? 1 : 0;
+    moving += best.motions[l] != TrackMotion::kAtRest ? 1 : 0;
   }
   const bool is_group =
       group.tracks.size() >= kLeastGroup && 2 * group.tracks.size() > moving &&
@@ -292,19 +378,23 @@ DriftingTracks DriftFinder::find() {
       group.rate.norm() > kLeastDrift_px_s * pixel_rad_;
   if (!is_group) return out;
   // Would the group be at rest?
-  std::vector<char> other(fit_.tracks().size(), 0);
-  for (const std::size_t l : group.tracks) other[l] = 1;
-  const Hypothesis against = settle(std::move(other));
+  std::vector<TrackMotion> other(fit_.tracks().size(), TrackMotion::kFree);
+  for (const std::size_t l : group.tracks) other[l] = TrackMotion::kAtRest;
+  const Hypothesis against = settle(std::move(other), false, Vector2<double>::Zero());
   out.rate = group.rate;
-  if (against.holds && against.at_rest != best.at_rest && against.cost - best.cost < kSure) {
+  if (against.holds && against.motions != best.motions && against.cost - best.cost < kSure) {
     if (group.rate.norm() > kHarmful_px_s * pixel_rad_) out.finding = DriftFinding::kUndecided;
     return out;
   }
+  // With the group's rate known, stretches of time in which clouds are all that is in view.
+  best.shared_rate = group.rate;
+  Hypothesis grouped = settle(consistent(group.rate), true, group.rate);
+  if (grouped.holds && grouped.cost < best.cost) best = std::move(grouped);
+  // Rates are those of the latest solution.
+  if (!fit_.solve(best.motions, best.shared_rate, &cost)) return out;
   out.finding = DriftFinding::kGroup;
-  for (std::size_t l = 0; l < fit_.tracks().size(); ++l) {
-    out.drifts[l] = best.at_rest[l] == 0 ? 1 : 0;
-    out.count += out.drifts[l];
-  }
+  out.rate = best.shared_rate;
+  mark(best, &out);
   return out;
 }
 
