@@ -15,9 +15,9 @@ namespace {
 
 constexpr double kSharedWidth = 1920;
 constexpr double kSharedHeight = 1080;
-constexpr double kSharedFocal = 8000;  // px
-constexpr double kLineDelay = 20e-6;   // s
-constexpr double kOwnNoise = 0.1;      // px
+constexpr double kSharedFocal = 8000;       // px
+constexpr double kSharedLineDelay = 20e-6;  // s
+constexpr double kOwnNoise = 0.1;           // px
 constexpr int kSharedLandmarks = 180;
 
 // Angle, rate and acceleration are all 0.
@@ -46,7 +46,7 @@ class HazyFrames {
       landmark.u.x() = uniform(kSharedWidth);
       landmark.u.y() = uniform(kSharedHeight);
       landmark.J_angle = kSharedFocal * Matrix2<double>::Identity();
-      landmark.time_s = kLineDelay * (landmark.u.y() - kSharedHeight / 2);
+      landmark.time_s = kSharedLineDelay * (landmark.u.y() - kSharedHeight / 2);
       landmark.covariance = kOwnNoise * kOwnNoise * Matrix2<double>::Identity();
       landmark.shared_covariance.setZero();
       landmark.residual.x() = normal(kOwnNoise);
@@ -61,7 +61,7 @@ class HazyFrames {
     prior.sharing = sharing->factor();
     SolvedMotion solved;
     EXPECT_EQ(solve_orientation(landmarks.data(), kSharedLandmarks, prior, {}, kSharedWidth,
-                                kSharedHeight, kLineDelay * kSharedHeight / 2, &solved),
+                                kSharedHeight, kSharedLineDelay * kSharedHeight / 2, &solved),
               SolveStatus::kOk);
     sharing->note(solved.single_squares, solved.large_squares, solved.large_averages);
     // Units alike, for the solution.

@@ -9,8 +9,8 @@
 namespace alidade {
 namespace {
 
-constexpr double kPixel = 1e-4;  // rad
-constexpr double kFrame_s = 0.04;
+constexpr double kFollowedPixel = 1e-4;  // rad
+constexpr double kFollowedFrame_s = 0.04;
 constexpr double kTelemetry_px = 0.3;
 
 using Offset_px = std::function<double(double)>;
@@ -19,8 +19,8 @@ SeenOffset seen(double time_s, double offset_px, std::mt19937_64* generator) {
   std::normal_distribution<double> normal(0, kTelemetry_px);
   SeenOffset out;
   out.time_s = time_s;
-  out.offset = kPixel * Vector2<double>(offset_px + normal(*generator), normal(*generator));
-  out.variance.setConstant(kPixel * kPixel * kTelemetry_px * kTelemetry_px);
+  out.offset = kFollowedPixel * Vector2<double>(offset_px + normal(*generator), normal(*generator));
+  out.variance.setConstant(kFollowedPixel * kFollowedPixel * kTelemetry_px * kTelemetry_px);
   return out;
 }
 
@@ -40,15 +40,15 @@ Errors errors_of(const Offset_px& offset, double moving_px_s) {
     std::mt19937_64 generator(static_cast<std::uint64_t>(film) + 1);
     MapFollower follower;
     for (int i = 0; i < kFrames; ++i) {
-      const double t = kFrame_s * i;
-      follower.note_moving(t, kPixel * moving_px_s);
+      const double t = kFollowedFrame_s * i;
+      follower.note_moving(t, kFollowedPixel * moving_px_s);
       FollowedOffset now;
       if (i > 12) {
-        EXPECT_TRUE(follower.follow(t, kPixel, &now));
-        const double error = now.value.x() - kPixel * offset(t);
+        EXPECT_TRUE(follower.follow(t, kFollowedPixel, &now));
+        const double error = now.value.x() - kFollowedPixel * offset(t);
         out.mean_square += error * error / now.variance.x();
-        out.root_mean_px += error * error / (kPixel * kPixel);
-        out.sigma_px = std::sqrt(now.variance.x()) / kPixel;
+        out.root_mean_px += error * error / (kFollowedPixel * kFollowedPixel);
+        out.sigma_px = std::sqrt(now.variance.x()) / kFollowedPixel;
         ++count;
       }
       follower.note(seen(t, offset(t), &generator));
@@ -80,40 +80,40 @@ TEST(MapFollower, ChangesNothingWhereNothingMoved) {
   MapFollower follower;
   FollowedOffset now;
   for (int i = 0; i < 100; ++i) {
-    follower.note(seen(kFrame_s * i, 0, &generator));
-    ASSERT_FALSE(follower.follow(kFrame_s * i, kPixel, &now));
+    follower.note(seen(kFollowedFrame_s * i, 0, &generator));
+    ASSERT_FALSE(follower.follow(kFollowedFrame_s * i, kFollowedPixel, &now));
   }
-  follower.note_moving(4, kPixel);
-  EXPECT_TRUE(follower.follow(4, kPixel, &now));
-  EXPECT_TRUE(follower.follow(23, kPixel, &now));
-  EXPECT_FALSE(follower.follow(24.1, kPixel, &now));
-  follower.note_moving(4, kPixel);
+  follower.note_moving(4, kFollowedPixel);
+  EXPECT_TRUE(follower.follow(4, kFollowedPixel, &now));
+  EXPECT_TRUE(follower.follow(23, kFollowedPixel, &now));
+  EXPECT_FALSE(follower.follow(24.1, kFollowedPixel, &now));
+  follower.note_moving(4, kFollowedPixel);
   follower.begin_map();
-  EXPECT_FALSE(follower.follow(4, kPixel, &now));
+  EXPECT_FALSE(follower.follow(4, kFollowedPixel, &now));
   follower.reset();
-  EXPECT_FALSE(follower.follow(4, kPixel, &now));
+  EXPECT_FALSE(follower.follow(4, kFollowedPixel, &now));
 }
 
 TEST(MapFollower, MovesWithTheMap) {
   std::mt19937_64 generator(1);
   std::mt19937_64 same(1);
-  const Vector2<double> by = kPixel * Vector2<double>(2, -1);
+  const Vector2<double> by = kFollowedPixel * Vector2<double>(2, -1);
   MapFollower moved;
   MapFollower begun_there;
-  for (MapFollower* follower : {&moved, &begun_there}) follower->note_moving(0, kPixel);
+  for (MapFollower* follower : {&moved, &begun_there}) follower->note_moving(0, kFollowedPixel);
   for (int i = 0; i < 50; ++i) {
-    moved.note(seen(kFrame_s * i, 0, &generator));
-    SeenOffset there = seen(kFrame_s * i, 0, &same);
+    moved.note(seen(kFollowedFrame_s * i, 0, &generator));
+    SeenOffset there = seen(kFollowedFrame_s * i, 0, &same);
     there.offset += by;
     begun_there.note(there);
   }
   moved.move_offset(by);
   FollowedOffset a;
   FollowedOffset b;
-  ASSERT_TRUE(moved.follow(2, kPixel, &a));
-  ASSERT_TRUE(begun_there.follow(2, kPixel, &b));
-  EXPECT_LT((a.value - b.value).norm(), 1e-9 * kPixel);
-  EXPECT_LT((a.variance - b.variance).norm(), 1e-9 * kPixel * kPixel);
+  ASSERT_TRUE(moved.follow(2, kFollowedPixel, &a));
+  ASSERT_TRUE(begun_there.follow(2, kFollowedPixel, &b));
+  EXPECT_LT((a.value - b.value).norm(), 1e-9 * kFollowedPixel);
+  EXPECT_LT((a.variance - b.variance).norm(), 1e-9 * kFollowedPixel * kFollowedPixel);
 }
 
 }  // namespace
