@@ -153,7 +153,7 @@ TEST(Departures, DistortionOfFifthOrderIsNamed) {
 // In pictures whose errors are five times as large as stated, and a part of whose scene moves, a
 // score cannot tell the fifth order. The third order takes it: the sigma has to say so.
 TEST(Departures, DistortionOfFifthOrderThatOthersHideIsInTheSigmas) {
-  for (const std::uint64_t seed : {12, 14}) {
+  for (const std::uint64_t seed : {std::uint64_t{12}, std::uint64_t{14}}) {
     const Simulation s = narrow_camera(seed);
     const auto grid = test::simulate_with_truth(s).grid;
     const double corner = std::hypot(s.width / 2.0, s.height / 2.0);
