@@ -170,7 +170,7 @@ void apply_step(const Eigen::VectorXd& x, const std::vector<Vector2<double>>& x_
   mechanics.tilt_scale += global[index(Parameter::kTiltScale)];
   state->shift_s += global[index(Parameter::kClockOffset)];
   state->drift += global[kDrift];
-  for (std::size_t i = 0; i < state->landmarks.size(); ++i) {
+  for (std::size_t i = 0; i < std::min(state->landmarks.size(), x_landmark.size()); ++i) {
     state->landmarks[i] = direction_plus<double>(state->landmarks[i], x_landmark[i]).normalized();
   }
   for (std::size_t i = 0; i < state->nearness.size(); ++i)
