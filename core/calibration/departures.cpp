@@ -377,17 +377,16 @@ Departures find_departures(const Adjustment& adjustment, const AdjustmentState& 
   }
   if (!state.nearness.empty()) {
     found.depth = nearness_spread(state, at);
-    found.depth_is_shown = true;
+    found.depth_is_likeliest = true;
     found.causes.insert(found.causes.begin(), cause_of(found.depth));
     found.error +=
         common_nearness(state, adjustment, std::pow(kCommonDepth * found.depth.sigma, 2));
   } else {
     found.depth = depth_spread(adjustment, state, at, factor);
-    found.depth_is_shown = found.depth.log_chance < limit;
-    if (found.depth_is_shown) {
-      found.causes.insert(
-          found.depth.log_chance < likeliest ? found.causes.begin() : found.causes.end(),
-          cause_of(found.depth));
+    found.depth_is_likeliest = found.depth.log_chance < likeliest;
+    if (found.depth.log_chance < limit) {
+      found.causes.insert(found.depth_is_likeliest ? found.causes.begin() : found.causes.end(),
+                          cause_of(found.depth));
       add_to_focal_length(std::pow(kCommonDepth * found.depth.sigma, 2));
     }
   }

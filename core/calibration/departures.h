@@ -24,8 +24,8 @@ struct Departures {
   // recording too, and what r^5 distortion does that no part shows.
   GlobalMatrix error = GlobalMatrix::Zero();
   GlobalMatrix hidden = GlobalMatrix::Zero();
-  DepthSpread depth;  // of different distances
-  bool depth_is_shown = false;
+  DepthSpread depth;                // of different distances
+  bool depth_is_likeliest = false;  // more so than all other causes
 };
 
 // state, at, factor: the minimum of least squares, of which adjustment has the covariance.

@@ -390,7 +390,8 @@ void StagedAdjustment::allow_for_contradictions(CalibrationQuality* quality) {
   const Departures departures =
       find_departures(adjustment_, adjusted_.state, adjusted_.at, factor, lens_growth);
   quality->causes = departures.causes;
-  if (departures.depth_is_shown && nearness_sigma_ == 0) seen_nearness_ = departures.depth.sigma;
+  if (departures.depth_is_likeliest && nearness_sigma_ == 0)
+    seen_nearness_ = departures.depth.sigma;
   adjusted_.covariance += departures.error;
   hidden_ = departures.hidden;
   // What landmarks and frames have in common is part of what parts show.

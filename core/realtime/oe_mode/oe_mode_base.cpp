@@ -47,7 +47,7 @@ Matrix6 OeMode::covariance_of_answer(const SolvedMotion& solved, const TiedOffse
   // What is followed needs no doubt of how far the map has gone along.
   if (followed) {
     covariance.topLeftCorner<2, 2>().diagonal() += followed->variance;
-  } else {
+  } else if (!by_map || !drift_.is_young()) {
     covariance.topLeftCorner<2, 2>() += drift_.doubt();
   }
   return covariance;

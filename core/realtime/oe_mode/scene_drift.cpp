@@ -237,6 +237,8 @@ SceneVerdict SceneDrift::judge_two(double pixel) {
   return of_group - of_apart > kDecided ? SceneVerdict::kMapMoves : SceneVerdict::kUndecided;
 }
 
+bool SceneDrift::is_young() const { return noted_s_ - begun_s_ < kLeastTrial_s; }
+
 SceneVerdict SceneDrift::judge_one(double pixel) {
   doubt_.setZero();
   Rate map;

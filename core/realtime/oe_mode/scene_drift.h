@@ -63,6 +63,8 @@ class SceneDrift {
   // rad^2, of (pan, tilt): by how much the map may have drifted along without anything being
   // shown yet.
   [[nodiscard]] const Matrix2<double>& doubt() const { return doubt_; }
+  // Whether that is by less than a second of telemetry, so that its noise alone often shows some.
+  [[nodiscard]] bool is_young() const;
 
   // The frame's landmarks that move, by the latest verdict: calls use(slot, id, d, rate).
   template <class Use>
