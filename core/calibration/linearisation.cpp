@@ -5,105 +5,11 @@
 #include <cmath>
 
 #include "core/calibration/nearness_columns.h"
+#include "core/calibration/observation_model.h"
 
 namespace alidade::internal {
 
 namespace {
-
-using CameraJacobian = Eigen::Matrix<double, 2, kObservedCount>;
-
-// Image motion per row read out, in rows. Beyond this a landmark meets the read-out in no definite
-// row.
-constexpr double kMaxRowSlope = 0.9;
-
-struct ObservationModel {
-  const Camera<double> camera;
-  const Mechanics<double>& mechanics;
-  const double line_delay;
-  const CornerDistortion<double> distortion_unit;
-  Matrix3<double> R_base_from_anchor;
-  Matrix<double, 3, 4> J_xi_axes_anchor;
-
-  explicit ObservationModel(const AdjustmentState& state)
-      : camera(state.physical_camera()),
-        mechanics(state.mechanics),
-        line_delay(state.line_delay()),
-        distortion_unit(corner_unit(state.camera)) {
-    J_xi_axes_anchor.setZero();
-    R_base_from_anchor =
-        R_base_from_camera(state.mechanics, state.anchor, nullptr, &J_xi_axes_anchor);
-  }
-
-  struct Landmark {
-    Vector3<double> d_b;
-    Matrix<double, 3, 2> J_db_landmark;
-    Matrix<double, 3, 4> J_db_axes;
-  };
-  [[nodiscard]] Landmark turn(const Vector3<double>& d_anchor) const {
-    return {R_base_from_anchor * d_anchor, R_base_from_anchor * tangent_basis(d_anchor),
-            -R_base_from_anchor * (skew(d_anchor) * J_xi_axes_anchor)};
-  }
-
-  struct Result {
-    Vector2<double> error;
-    Matrix2<double> J_angle;  // of the projection, like the following
-    Matrix2<double> J_landmark;
-    Vector2<double> J_nearness;
-    CameraJacobian J_camera;
-  };
-
-  // Error and derivatives in units of sigma. row: if not null, its last four members too.
-  [[nodiscard]] bool evaluate(const AdjustmentObservation& observation,
-                              const PanTilt<double>& angle, const PanTilt<double>& rate,
-                              const Landmark& landmark, double nearness, Result* out,
-                              ObservationRow* row = nullptr) const {
-    Matrix<double, 3, 2> J_xi_angle;
-    Matrix<double, 3, 4> J_xi_axes;
-    const Matrix3<double> R = R_base_from_camera(mechanics, angle, &J_xi_angle, &J_xi_axes);
-    const Vector3<double> d_far = R.transpose() * landmark.d_b;
-    const Vector3<double> d_c = d_far - nearness * Vector3<double>::UnitZ();
-    Vector2<double> u;
-    Matrix<double, 2, 3> J_u_dc;
-    Matrix<double, 2, kCameraParameterCount> J_u_camera;
-    if (project(camera, d_c, &u, &J_u_dc, &J_u_camera) != ProjectionStatus::kOk) return false;
-    const Matrix<double, 2, 3> J_u_xi = J_u_dc * skew(d_far);
-    const Matrix2<double> J_u_angle = J_u_xi * J_xi_angle;
-    const Vector2<double> J_u_time = J_u_angle * rate.vector();
-    const Vector2<double> J_u_row = J_u_time * line_delay;
-    if (J_u_row.y() > kMaxRowSlope) return false;
-
-    Matrix2<double> whiten;  // A^-1 / sigma
-    whiten << 1, J_u_row.x() / (1 - J_u_row.y()), 0, 1 / (1 - J_u_row.y());
-    whiten /= observation.sigma;
-    out->error = whiten * (observation.u - u);
-    out->J_angle = whiten * J_u_angle;
-    const Matrix<double, 2, 3> J_u_db = J_u_dc * R.transpose();
-    out->J_landmark = whiten * (J_u_db * landmark.J_db_landmark);
-    out->J_nearness = -(whiten * J_u_dc.col(2));
-    CameraJacobian J;
-    J.col(camera_column::kFocalLength) = by_zoom(camera, J_u_camera);
-    J.col(camera_column::kAspect) = camera.aspect * J_u_camera.col(camera_column::kAspect);
-    for (int i = 0; i < kDistortionCount; ++i) {
-      const int column = camera_column::kDistortion + i;
-      J.col(column) = distortion_unit[i] * J_u_camera.col(column);
-    }
-    J.middleCols<2>(camera_column::kCentreU) = J_u_camera.middleCols<2>(camera_column::kCentreU);
-    J.col(index(Parameter::kLineDelay)) = J_u_time * (observation.u.y() / camera.height);
-    J.rightCols<4>() = J_u_xi * J_xi_axes + J_u_db * landmark.J_db_axes;
-    out->J_camera = whiten * J;
-    if (row != nullptr) {
-      row->whiten = whiten;
-      row->d_c = d_c;
-      row->J_u_dc = J_u_dc;
-      row->u_rate = J_u_time;
-    }
-    return true;
-  }
-};
-
-double nearness_of(const AdjustmentState& state, int landmark) {
-  return state.nearness.empty() ? 0 : state.nearness[static_cast<std::size_t>(landmark)];
-}
 
 struct RobustCost {
   double cost;
@@ -334,10 +240,7 @@ std::vector<Influence> Lineariser::influences(const AdjustmentState& state, cons
       }
       all[i] = of_angle * result.J_angle.transpose() + of_camera * result.J_camera.transpose() -
                of_landmark * result.J_landmark.transpose();
-      if (has_nearness) {
-        all[i] -= of_nearness *
-                  (result.J_nearness - result.J_landmark * at.direction_by_nearness[l]).transpose();
-      }
+      if (has_nearness) all[i] -= of_nearness * result.J_nearness_alone(at, l).transpose();
     }
   }
   return all;
@@ -366,11 +269,8 @@ void Lineariser::visit(const AdjustmentState& state, const Linearisation& at,
     row.J_angle = result.J_angle;
     row.J_landmark = result.J_landmark;
     row.J_nearness.setZero();
-    if (!state.nearness.empty()) {
-      row.J_nearness =
-          result.J_nearness -
-          result.J_landmark * at.direction_by_nearness[static_cast<std::size_t>(o.landmark)];
-    }
+    if (!state.nearness.empty())
+      row.J_nearness = result.J_nearness_alone(at, static_cast<std::size_t>(o.landmark));
     row.J_camera = result.J_camera;
     observation(row);
   }
