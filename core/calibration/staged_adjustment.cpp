@@ -183,33 +183,36 @@ bool StagedAdjustment::settle_robustly() {
   return settled;
 }
 
-// True if something was left out; the adjustment then begins anew. What drifts led the trajectory
-// astray, so it is found again about the one without it.
+// True if something was left out; the adjustment then begins anew.
 bool StagedAdjustment::leave_out_drifting() {
   DriftingTracks found =
       find_drifting_tracks(&selected_->data, adjusted_.state, noise_.resolution_rad, &adjustment_);
   drift_ = found.finding;
   drift_px_s_ = found.rate.norm() * adjusted_.state.camera.focal_length;
   if (drift_ != DriftFinding::kGroup) return false;
+  DriftingTracks again = find_drifting_without(found.drifts);
+  if (again.finding == DriftFinding::kGroup) found = std::move(again);
+  drifting_ = leave_out(found.drifts, selected_, {&start_});
+  adjusted_.state = start_;
+  return true;
+}
+
+// What drifts led the trajectory astray: the search about the one without it.
+DriftingTracks StagedAdjustment::find_drifting_without(const std::vector<char>& drifts) {
   const SelectedInput all = *selected_;
   const AdjustmentState all_start = start_;
-  static_cast<void>(leave_out(found.drifts, selected_, {&start_}));
+  static_cast<void>(leave_out(drifts, selected_, {&start_}));
   adjusted_.state = start_;
   static_cast<void>(settle_robustly());
   AdjustmentState state = adjusted_.state;
   state.landmarks = all_start.landmarks;
   std::size_t next = 0;
-  for (std::size_t l = 0; l < found.drifts.size(); ++l) {
-    if (found.drifts[l] == 0) state.landmarks[l] = adjusted_.state.landmarks[next++];
+  for (std::size_t l = 0; l < drifts.size(); ++l) {
+    if (drifts[l] == 0) state.landmarks[l] = adjusted_.state.landmarks[next++];
   }
   *selected_ = all;
   start_ = all_start;
-  DriftingTracks again =
-      find_drifting_tracks(&selected_->data, state, noise_.resolution_rad, &adjustment_);
-  if (again.finding == DriftFinding::kGroup) found = std::move(again);
-  drifting_ = leave_out(found.drifts, selected_, {&start_});
-  adjusted_.state = start_;
-  return true;
+  return find_drifting_tracks(&selected_->data, state, noise_.resolution_rad, &adjustment_);
 }
 
 // What it contradicted may have made knots where none are needed: begins anew.

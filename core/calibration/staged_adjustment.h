@@ -3,6 +3,7 @@
 // values to the final covariance. Allocates; one object for each recording.
 
 #include <string>
+#include <vector>
 
 #include "core/calibration/adjustment.h"
 #include "core/calibration/centre_share.h"
@@ -56,6 +57,7 @@ class StagedAdjustment {
  private:
   [[nodiscard]] bool settle_robustly();
   [[nodiscard]] bool leave_out_drifting();
+  [[nodiscard]] DriftingTracks find_drifting_without(const std::vector<char>& drifts);
   void give_nearness();
   [[nodiscard]] bool settle_on_inliers();
   [[nodiscard]] bool settle_departures();
