@@ -22,13 +22,14 @@ class ErrorSharing {
   // A frame that landmarks answered.
   void note(const ResidualSquares& single, const ResidualSquares& large,
             const LargeAverages& averages);
-  [[nodiscard]] double factor() const;      // >= 1, for the covariance of a frame
-  [[nodiscard]] double repetition() const;  // >= 1
+  [[nodiscard]] double factor() const;  // >= 1, for the covariance of a frame
 
  private:
   static constexpr double kMemory = 64;        // frames
   static constexpr double kFirstFreedom = 12;  // degrees, of independent errors before the first
   static constexpr std::size_t kLags = 8;      // frames
+
+  [[nodiscard]] double repetition() const;  // >= 1
 
   ResidualSquares single_{kFirstFreedom, kFirstFreedom};
   ResidualSquares large_{kFirstFreedom, kFirstFreedom};

@@ -4,12 +4,13 @@
 #include <cmath>
 #include <cstddef>
 
+#include "core/realtime/oe_mode/moving_directions.h"
+
 namespace alidade {
 namespace {
 
 constexpr double kMemory_s = 0.5;
-constexpr double kRemembered_s = 20;  // that something moved
-constexpr double kLeastWeight = 3;    // readings
+constexpr double kLeastWeight = 3;  // readings
 constexpr double kLeastRate_px_s = 0.2;
 constexpr double kUnmodelled_px = 0.02;
 
@@ -22,12 +23,7 @@ void MapFollower::note(const SeenOffset& seen) {
   noted_s_ = std::max(noted_s_, seen.time_s);
   const Vector2<double> row(1, seen.time_s - begun_s_);
   for (int i = 0; i < 2; ++i) {
-    Line& line = lines_[static_cast<std::size_t>(i)];
-    const double information = 1 / seen.variance[i];
-    line.normal = keep * line.normal + information * row * row.transpose();
-    line.gradient = keep * line.gradient + information * seen.offset[i] * row;
-    line.square = keep * line.square + information * seen.offset[i] * seen.offset[i];
-    line.weight = keep * line.weight + 1;
+    lines_[static_cast<std::size_t>(i)].add(keep, row, seen.offset[i], 1 / seen.variance[i]);
   }
 }
 
@@ -37,19 +33,15 @@ void MapFollower::note_moving(double time_s, double rate) {
 }
 
 void MapFollower::move_offset(const Vector2<double>& by) {
-  for (int i = 0; i < 2; ++i) {
-    Line& line = lines_[static_cast<std::size_t>(i)];
-    line.square += by[i] * (2 * line.gradient[0] + by[i] * line.normal(0, 0));
-    line.gradient += by[i] * line.normal.col(0);
-  }
+  for (int i = 0; i < 2; ++i) lines_[static_cast<std::size_t>(i)].move(by[i]);
 }
 
 bool MapFollower::follow(double time_s, double pixel, FollowedOffset* out) const {
-  if (!(time_s - moved_s_ < kRemembered_s)) return false;
+  if (!(time_s - moved_s_ < MovingDirections::kRemembered_s)) return false;
   const double rate = std::max(rate_, kLeastRate_px_s * pixel);
   const Vector2<double> now(1, time_s - begun_s_);
   for (int i = 0; i < 2; ++i) {
-    const Line& line = lines_[static_cast<std::size_t>(i)];
+    const FadingFit<2>& line = lines_[static_cast<std::size_t>(i)];
     if (line.weight < kLeastWeight) return false;
     Matrix2<double> normal = line.normal;
     normal(1, 1) += 1 / (rate * rate);
@@ -59,7 +51,7 @@ bool MapFollower::follow(double time_s, double pixel, FollowedOffset* out) const
     // A bend that the line does not follow shows in its misfit. Less than what is stated is not
     // believed: errors that all readings of half a second share leave no misfit.
     const double freedom = std::max(1.0, line.weight - 2);
-    const double misfit = (line.square - x.dot(line.gradient)) / freedom;
+    const double misfit = line.left(x) / freedom;
     out->variance[i] = now.dot(covariance * now) * std::max(1.0, misfit);
   }
   out->variance.array() += kUnmodelled_px * kUnmodelled_px * pixel * pixel;

@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "core/model/linear_algebra.h"
+#include "core/realtime/oe_mode/fading_fit.h"
 #include "core/realtime/oe_mode/scene_drift.h"
 
 namespace alidade {
@@ -36,16 +37,9 @@ class MapFollower {
   [[nodiscard]] bool follow(double time_s, double pixel, FollowedOffset* out) const;
 
  private:
-  // Of one axis: offset = a + b (t - begun). What is older counts less.
-  struct Line {
-    Matrix2<double> normal = Matrix2<double>::Zero();
-    Vector2<double> gradient = Vector2<double>::Zero();
-    double square = 0;
-    double weight = 0;  // count
-  };
   static constexpr double kNever = -std::numeric_limits<double>::infinity();
 
-  std::array<Line, 2> lines_;
+  std::array<FadingFit<2>, 2> lines_;  // of each axis: offset = a + b (t - begun)
   double begun_s_ = 0;
   double noted_s_ = 0;
   double moved_s_ = kNever;

@@ -104,23 +104,13 @@ bool gate(const OrientationProblem& problem, const ScaledPrior& scaled, const So
         solve_without_angles(problem, scaled, fit->weights.data(), fit->scale_square, false).best();
     find_squares(problem, fit->x, &fit->squares);
     // The scale of the inliers, for the next step and the solution.
-    double square = 0;
+    fit->of_inliers = {0, 2.0 * inliers - 6};
     for (int i = 0; i < count; ++i) {
-      if (landmarks[i].inlier) square += fit->squares[static_cast<std::size_t>(i)];
+      if (landmarks[i].inlier) fit->of_inliers.sum += fit->squares[static_cast<std::size_t>(i)];
     }
-    fit->scale_square = std::clamp(square / (2 * inliers - 6), 1.0, max_square);
+    fit->scale_square = std::clamp(fit->of_inliers.sum / fit->of_inliers.freedom, 1.0, max_square);
   }
   return true;
-}
-
-ResidualSquares single_squares(const Fit& fit, const FoundLandmark* landmarks, int count) {
-  ResidualSquares out{0, -6};
-  for (int i = 0; i < count; ++i) {
-    if (!landmarks[i].inlier) continue;
-    out.sum += fit.squares[static_cast<std::size_t>(i)];
-    out.freedom += 2;
-  }
-  return out;
 }
 
 ResidualSquares neighbours_squares(const OrientationProblem& problem,

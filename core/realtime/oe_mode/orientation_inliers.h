@@ -21,10 +21,11 @@ using Weights = std::array<double, kMaxFoundLandmarks>;  // 0 to 1
 
 struct Fit {
   MotionAndLens x;
-  Squares squares;          // at x
-  Weights weights;          // as last used
-  double scale_square = 1;  // factor for the landmarks' covariances, by gate()
-  int inliers = 0;          // by gate()
+  Squares squares;             // at x
+  Weights weights;             // as last used
+  double scale_square = 1;     // factor for the landmarks' covariances, by gate()
+  int inliers = 0;             // by gate()
+  ResidualSquares of_inliers;  // single ones, by gate()
 };
 
 void find_squares(const OrientationProblem& problem, const MotionAndLens& x, Squares* out);
@@ -36,10 +37,6 @@ void find_squares(const OrientationProblem& problem, const MotionAndLens& x, Squ
 // Sets the landmarks' `inlier`. False if too few are.
 [[nodiscard]] bool gate(const OrientationProblem& problem, const ScaledPrior& scaled,
                         const SolveLimits& limits, FoundLandmark* landmarks, Fit* fit);
-
-// Squares of the inliers' residuals.
-[[nodiscard]] ResidualSquares single_squares(const Fit& fit, const FoundLandmark* landmarks,
-                                             int count);
 
 // Neighbourhoods of an image. The motion takes `absorbed` degrees of freedom from their averages:
 // all that depends on the row alone, as far as it is not averaged out within a cell.

@@ -68,7 +68,7 @@ SolveStatus solve_orientation(FoundLandmark* landmarks, int count, const MotionP
       internal::neighbours_squares(problem, landmarks, width, height, internal::kSmallCells, fit.x);
   out->large_squares = internal::neighbours_squares(
       problem, landmarks, width, height, internal::kLargeCells, fit.x, &out->large_averages);
-  out->single_squares = internal::single_squares(fit, landmarks, count);
+  out->single_squares = fit.of_inliers;
   // With few neighbourhoods too little is known.
   const double inflation =
       std::max(fit.scale_square, small.freedom > 6 ? small.sum / small.freedom : 1.0);

@@ -50,7 +50,7 @@ void SceneDrift::reset() {
 void SceneDrift::begin_map() {
   for (Record& record : records_) record.weight = 0;
   noted_count_ = 0;
-  for (OffsetLine& line : lines_) line = {};
+  for (FadingFit<3>& line : lines_) line = {};
   has_offsets_ = false;
   mean_square_rate_ = 0;
   verdict_ = SceneVerdict::kRest;
@@ -69,14 +69,9 @@ void SceneDrift::note(const SeenOffset& seen) {
   noted_s_ = std::max(noted_s_, seen.time_s);
   slope_sigma_ = seen.slope_sigma;
   for (int i = 0; i < 2; ++i) {
-    OffsetLine& line = lines_[static_cast<std::size_t>(i)];
     const Vector3<double> row(1, seen.time_s - begun_s_,
                               wrap_angle(seen.angle[i] - begun_angle_[i]));
-    const double information = 1 / seen.variance[i];
-    line.normal = keep * line.normal + information * row * row.transpose();
-    line.gradient = keep * line.gradient + information * seen.offset[i] * row;
-    line.square = keep * line.square + information * seen.offset[i] * seen.offset[i];
-    line.weight = keep * line.weight + 1;
+    lines_[static_cast<std::size_t>(i)].add(keep, row, seen.offset[i], 1 / seen.variance[i]);
   }
 }
 
@@ -189,7 +184,7 @@ bool SceneDrift::map_rate(const Vector2<double>& slope_sigma, double pixel, Rate
   double freedom = 0;
   out->misfit = 0;
   for (int i = 0; i < 2; ++i) {
-    const OffsetLine& line = lines_[static_cast<std::size_t>(i)];
+    const FadingFit<3>& line = lines_[static_cast<std::size_t>(i)];
     if (line.weight < kLeastSeen) return false;
     Matrix3<double> normal = line.normal;
     // Exact, without the slope.
@@ -206,7 +201,7 @@ bool SceneDrift::map_rate(const Vector2<double>& slope_sigma, double pixel, Rate
     // The camera turns by as much less.
     out->value[i] = -x[1];
     out->variance[i] = inverse(1, 1);
-    out->misfit += std::max(0.0, line.square - x.dot(line.gradient));
+    out->misfit += std::max(0.0, line.left(x));
     freedom += std::max(1.0, line.weight - 3);
   }
   out->misfit /= freedom;

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "core/model/linear_algebra.h"
+#include "core/realtime/oe_mode/fading_fit.h"
 #include "core/realtime/oe_mode/orientation_solve.h"
 
 namespace alidade {
@@ -109,13 +110,6 @@ class SceneDrift {
     double variance = 0;
     double life_s = 0;
   };
-  // Of one axis: offset = a + rate t + slope angle.
-  struct OffsetLine {
-    Matrix3<double> normal = Matrix3<double>::Zero();
-    Vector3<double> gradient = Vector3<double>::Zero();
-    double square = 0;
-    double weight = 0;  // count
-  };
   struct Rate {
     Vector2<double> value = Vector2<double>::Zero();
     Vector2<double> variance = Vector2<double>::Zero();
@@ -133,7 +127,7 @@ class SceneDrift {
   std::array<Noted, kMaxFoundLandmarks> noted_{};
   std::size_t noted_count_ = 0;
   std::array<double, kMaxFoundLandmarks> sorted_{};
-  std::array<OffsetLine, 2> lines_;
+  std::array<FadingFit<3>, 2> lines_;  // of each axis: offset = a + rate t + slope angle
   Vector2<double> slope_sigma_ = Vector2<double>::Zero();
   double begun_s_ = 0;  // of the offsets
   Vector2<double> begun_angle_ = Vector2<double>::Zero();
