@@ -9,7 +9,9 @@
 // Statistics: docs/clocks.md.
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
 #include <limits>
 #include <optional>
 
@@ -40,14 +42,12 @@ class MinimumDelayStep {
   }
 
   // The step, if a run has lasted until this receive time and shows one. Both runs then begin anew.
-  // To be called before the item is added to a run. usual_delay_s: mean of the usual delays above the
-  // line, as those near it have it; a run's own counts if it is larger. rate_sigma: of the line's
-  // rate (host seconds per host second); the halves may differ by it.
-  std::optional<DelayStep> judge(double receive_s, double usual_delay_s = 0,
-                                 double rate_sigma = 0) {
+  // To be called before the item is added to a run. rate_sigma: of the line's rate (host seconds
+  // per host second); the halves may differ by it.
+  std::optional<DelayStep> judge(double receive_s, double rate_sigma = 0) {
     const double drift_s = kReach * rate_sigma * settle_s_ / 2;
-    const std::optional<DelayStep> fall = judge(&early_, true, receive_s, usual_delay_s, drift_s);
-    return fall ? fall : judge(&late_, false, receive_s, usual_delay_s, drift_s);
+    const std::optional<DelayStep> fall = judge(&early_, true, receive_s, drift_s);
+    return fall ? fall : judge(&late_, false, receive_s, drift_s);
   }
 
   void add_late(double receive_s, double residual_s) { late_.add(receive_s, residual_s, false); }
@@ -73,6 +73,7 @@ class MinimumDelayStep {
   static constexpr double kSameMinimum = 20;  // e^-20: odds that the difference is chance
   static constexpr double kLeastItems = 3;    // in half a run
   static constexpr double kReach = 6;         // sigmas
+  static constexpr std::size_t kLowest = 8;   // residuals that a half's spread is taken from
 
   // A suspected rise, long before it is judged. n exponential delays of mean s all exceed m with
   // probability e^(-n m / s). Of the late items up to the last, keeps the run with the greatest n m
@@ -110,6 +111,7 @@ class MinimumDelayStep {
     double items = 0;
     double early = 0;
     double sum = 0;
+    std::array<double, kLowest> lowest = {};  // residuals, ascending
 
     void add(double receive, double residual, bool is_early) {
       if (!active) {
@@ -118,6 +120,14 @@ class MinimumDelayStep {
         older = younger = residual;
       }
       younger = std::min(younger, residual);
+      std::size_t place = held();
+      if (place < kLowest || residual < lowest[kLowest - 1]) {
+        place = std::min(place, kLowest - 1);
+        for (; place > 0 && lowest[place - 1] > residual; --place) {
+          lowest[place] = lowest[place - 1];
+        }
+        lowest[place] = residual;
+      }
       items += 1;
       early += is_early ? 1 : 0;
       sum += residual;
@@ -129,11 +139,20 @@ class MinimumDelayStep {
       younger = std::numeric_limits<double>::infinity();
       items = early = sum = 0;
     }
+    [[nodiscard]] std::size_t held() const {
+      return items < static_cast<double>(kLowest) ? static_cast<std::size_t>(items) : kLowest;
+    }
     // Standard deviation of a half's minimum residual if its delays are exponential.
     [[nodiscard]] double spread() const { return (sum / items - younger) / items; }
+    // The same whatever the delays are, such as a relay's, few of which are short: the mean spacing
+    // of the lowest residuals. Strays among them make it large.
+    [[nodiscard]] double spacing() const {
+      const std::size_t n = held();
+      return n < 2 ? 0 : (lowest[n - 1] - lowest[0]) / static_cast<double>(n - 1);
+    }
   };
 
-  std::optional<DelayStep> judge(Run* run, bool falls, double receive, double usual, double drift) {
+  std::optional<DelayStep> judge(Run* run, bool falls, double receive, double drift) {
     if (!run->active || receive - run->middle < settle_s_ / 2) {
       return std::nullopt;
     }
@@ -141,7 +160,7 @@ class MinimumDelayStep {
       *run = {};  // a stray outlier
       return std::nullopt;
     }
-    const double spread = std::max({run->spread(), usual / run->items, resolution_s_});
+    const double spread = std::max({run->spread(), falls ? 0 : run->spacing(), resolution_s_});
     const double step = std::min(run->older, run->younger);
     if (run->middle == run->since || run->items < kLeastItems ||
         std::abs(run->older - run->younger) > kSameMinimum * spread + drift ||

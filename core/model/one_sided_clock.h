@@ -66,7 +66,7 @@ class OneSidedClock {
     }
     const bool held = steps_.suspects_rise() && on_line_ >= kLeastOnLine;
     const double rate_sigma = held ? std::sqrt(line().var_slope) / line().slope : 0;
-    if (const std::optional<DelayStep> step = steps_.judge(receive, usual_delay_s_, rate_sigma)) {
+    if (const std::optional<DelayStep> step = steps_.judge(receive, rate_sigma)) {
       envelope_.release();
       if (step->step_s < 0 || on_line_ >= kLeastOnLine) {
         subtract(*step, item.sigma_s);

@@ -71,10 +71,6 @@ Calibrating begin_calibrating(const Config& config, const std::string& path,
         use == CalibrationStore::Use::kKeep ? lock_store(config, result.store.get()) : use;
     for (const std::string& line : result.store->load(width, height, may))
       spdlog::info("calibration: {}", line);
-  } else if (config.calibration.automatic && use == CalibrationStore::Use::kKeep) {
-    spdlog::warn(
-        "calibration: calibration.file is not set: what this camera is calibrated to is lost when "
-        "the program ends, and each start begins with the data sheet; name a file to keep it");
   }
   const StoredCalibration* stored =
       result.store == nullptr ? nullptr : result.store->find(std::nullopt);

@@ -201,6 +201,11 @@ int run_live(const RunOptions& options) {
   if (mqtt && !mqtt->start())
     throw CommandError(kExitFailed, "the thread for MQTT cannot be started");
   if (targets) targets->start();
+  if (calibrating.calibration && config.calibration.automatic && config.calibration.file.empty()) {
+    spdlog::warn(
+        "calibration: calibration.file is not set: what this camera is calibrated to is lost when "
+        "the program ends, and each start begins with the data sheet; name a file to keep it");
+  }
   pipeline.start();
   const ServiceManager manager;
   manager.ready();

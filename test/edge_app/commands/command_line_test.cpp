@@ -320,6 +320,20 @@ TEST_F(CommandLineTest, RunWithoutCalibratingTakesCalibrationsOfSeveralZooms) {
   EXPECT_THAT(result.errors, AllOf(HasSubstr("zoom 1"), HasSubstr("zoom 2")));
 }
 
+// A warning that belongs to a run that begins: an error of the configuration stays one line.
+TEST_F(CommandLineTest, RunWarnsThatWithoutAFileItsCalibrationIsLost) {
+  const char* words = "is lost when the program ends";
+  const std::string camera = "camera: {focal_length_px: 30000}\n";
+  for (const auto& [more, warns] : {std::pair(camera, true),
+                                    {camera + "calibration: {file: calibration.yaml}\n", false},
+                                    {"realtime: {mode: PT}\n" + camera, false}}) {
+    const std::string config = live_config(", width: 1920, height: 1080", more);
+    const Result result = alidade({"run", "-c", config, "--duration", "0.1"});
+    EXPECT_EQ(result.exit_code, 0) << result.errors;
+    EXPECT_EQ(result.errors.find(words) != std::string::npos, warns) << more << result.errors;
+  }
+}
+
 // What run stored under its zoom, without a data sheet.
 TEST_F(CommandLineTest, CheckTakesTheCalibrationThatRunTakes) {
   const std::string stored = head_.calibration() + "zoom: 1\n";
