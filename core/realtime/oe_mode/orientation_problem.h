@@ -110,12 +110,12 @@ class OrientationProblem {
       const Term& term = terms_[static_cast<std::size_t>(i)];
       Matrix2<double> a = weights[i] * term.JtWJ;
       Vector2<double> v = weights[i] * (term.JtW * landmarks_[i].residual);
-      for (int power = 0; power < 5; ++power) {
-        A[power] += a;
+      for (Matrix2<double>& of_power : A) {
+        of_power += a;
         a *= term.t;
       }
-      for (int power = 0; power < 3; ++power) {
-        c[power] += v;
+      for (Vector2<double>& of_power : c) {
+        of_power += v;
         v *= term.t;
       }
     }
@@ -213,7 +213,7 @@ class OrientationProblem {
   template <Unknowns unknowns>
   [[nodiscard]] Vector2<double> left(int i, const MotionAndLens& at) const {
     const auto of_it = static_cast<std::size_t>(i);
-    const Vector2<double> r =
+    Vector2<double> r =
         landmarks_[i].residual - landmarks_[i].J_angle * angle_at(at.x, terms_[of_it].t);
     if constexpr (unknowns == Unknowns::kMotionAndLens) return r + at.phi * s_[of_it];
     if constexpr (unknowns == Unknowns::kAll) {
