@@ -3,6 +3,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 
+#include "core/calibration/axes_turn.h"
 #include "core/model/direction.h"
 
 namespace alidade {
@@ -31,6 +32,8 @@ Eigen::Matrix<double, kParameterCount, 1> difference(const Calibration& a, const
 
 double difference_chi_square(const Calibration& a, const Calibration& b, bool with_clock_offset) {
   const auto d = difference(a, b);
+  const ParameterCovariance<double> T = internal::axes_turn(b.mechanics, a.mechanics);
+  const ParameterCovariance<double> of_b = T * b.covariance * T.transpose();
   ComparedCovariance covariance;
   Compared x;
   for (int i = 0; i < kCount; ++i) {
@@ -38,7 +41,7 @@ double difference_chi_square(const Calibration& a, const Calibration& b, bool wi
     x[i] = d[row];
     for (int j = 0; j < kCount; ++j) {
       const int column = index(kComparedParameters[static_cast<std::size_t>(j)]);
-      covariance(i, j) = a.covariance(row, column) + b.covariance(row, column);
+      covariance(i, j) = a.covariance(row, column) + of_b(row, column);
     }
   }
   if (!with_clock_offset) {

@@ -8,6 +8,7 @@
 // G: an error of c px turns camera frame, base and axes together by c / f, which is no error of any
 // direction. Pure; no allocation. Derivation: docs/calibration.md.
 
+#include "core/calibration/axes_turn.h"
 #include "core/calibration/centre_share.h"
 #include "core/model/calibration.h"
 #include "core/model/direction.h"
@@ -79,6 +80,7 @@ namespace internal {
   if (!share.exists()) return exact;
   const Vector2<double> moved = free.camera.centre_offset() - exact.camera.centre_offset();
   share.covariance += moved * moved.transpose();
+  share.slope = internal::axes_turn(free.mechanics, exact.mechanics) * share.slope;
   Calibration out = exact;
   out.covariance += share.part();
   return out;

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/calibration/axes_turn.h"
 #include "core/calibration/contradictions.h"
 #include "core/calibration/departures.h"
 #include "core/calibration/knot_choice.h"
@@ -334,12 +335,16 @@ bool StagedAdjustment::hold_centre() {
     return false;
   }
   centre_held_ = adjusted_.covariance;
+  axes_held_ = adjusted_.state.mechanics;
   return true;
 }
 
 // What the data say of the centre loses as much as the most that another parameter lost.
 void StagedAdjustment::release_centre() {
   if (!centre_.exists()) return;
+  const GlobalMatrix T = axes_turn<kGlobalCount>(axes_held_, adjusted_.state.mechanics);
+  centre_.slope = (T * centre_.slope).eval();
+  centre_held_ = (T * centre_held_ * T.transpose()).eval();
   double growth = 1;
   for (int p = 0; p < kGlobalCount; ++p) {
     if (centre_held_(p, p) > 0)

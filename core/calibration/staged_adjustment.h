@@ -84,6 +84,7 @@ class StagedAdjustment {
   AdjustmentState start_;
   double telemetry_unknowns_ = 0;
   CentreShare<kGlobalCount> centre_;
+  Mechanics<double> axes_held_;                      // whose tangent bases centre_ is told in
   GlobalMatrix centre_held_ = GlobalMatrix::Zero();  // covariance before it grew
   GlobalMatrix hidden_ = GlobalMatrix::Zero();       // Departures
   bool settled_ = false;                             // by settle_robustly()

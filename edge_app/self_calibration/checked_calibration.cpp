@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/calibration/axes_turn.h"
 #include "core/calibration/centre_share.h"
 #include "core/calibration/held_out.h"
 #include "core/calibration/partial_inverse.h"
@@ -159,6 +160,10 @@ CheckedCalibration calibrate_session(const CalibrationSession& session,
   if (!(checked.adjustment.centre_sigma_px > 0) ||
       !grow_beyond_priors(checked.adjustment, excess, &result.calibration)) {
     result.calibration.covariance *= excess * excess;
+  }
+  if (known != nullptr && centre.exists()) {
+    centre.slope = internal::axes_turn(known->calibration.mechanics, result.calibration.mechanics) *
+                   centre.slope;
   }
   result.calibration.covariance += centre.part();
   const int d = index(Parameter::kClockOffset);

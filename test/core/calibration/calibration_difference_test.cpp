@@ -92,6 +92,25 @@ TEST(CalibrationDifference, IsTheSameFromBothSides) {
   EXPECT_NEAR(difference_chi_square(a, a), 0, 1e-20);
 }
 
+// Axes on either side of a jump of the tangent basis, known ten times better down than forward.
+TEST(CalibrationDifference, IsTheSameBesideAJumpOfTheBasis) {
+  const int tilt = index(Parameter::kTiltAxis0);
+  const auto leans = [&](double forward) {
+    Calibration c = some_calibration();
+    c.mechanics.tilt_axis = Vector3<double>(forward, 1, -0.0022).normalized();
+    c.covariance.middleRows<2>(tilt).setZero();
+    c.covariance.middleCols<2>(tilt).setZero();
+    const Matrix<double, 3, 2> B = tangent_basis(c.mechanics.tilt_axis);
+    const Vector3<double> variance(1e-6, 0, 1e-8);
+    c.covariance.block<2, 2>(tilt, tilt) = B.transpose() * variance.asDiagonal() * B;
+    return c;
+  };
+  // By 0.9 of a sigma of the difference, squared: 0.9^2 / 2.
+  EXPECT_NEAR(difference_chi_square(leans(-0.0007), leans(-0.0016)), 0.405, 0.01);
+  EXPECT_NEAR(difference_chi_square(leans(-0.0016), leans(-0.0025)), 0.405, 0.01);
+  EXPECT_NEAR(difference_chi_square(leans(-0.0025), leans(-0.0016)), 0.405, 0.01);
+}
+
 TEST(CalibrationDifference, AClockOffsetThatIsNotComparedMayBeAny) {
   const Calibration a = some_calibration();
   Calibration b = a;

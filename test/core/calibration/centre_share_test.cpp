@@ -121,6 +121,33 @@ TEST(CentreFrame, TheCentreIsShownWhereChanceDoesNotMoveItSoFar) {
   EXPECT_FALSE(centre_is_shown(c, Vector2<double>::Zero(), kPrior));
 }
 
+// An estimate whose tilt axis leans about as far forward as down, told on either side of the jump of
+// its tangent basis: what the centre does to the axes is the same in space.
+TEST(CentreFrame, WhatTheCentreDoesIsAddedInTheSameDirectionsBesideAJumpOfTheBasis) {
+  Calibration free;
+  free.camera = {3000, 1, {0}, 640, 360};
+  free.mechanics.tilt_axis = Vector3<double>(-0.0016, 1, -0.0022).normalized();
+  free.covariance = 1e-6 * random_covariance(3);
+  Calibration exact = free;
+  exact.covariance = 1e-6 * random_covariance(4);
+  exact.covariance.middleRows<2>(kCentre).setZero();
+  exact.covariance.middleCols<2>(kCentre).setZero();
+  const auto of_tilt_in_space = [](const Calibration& c) {
+    const Matrix<double, 3, 2> B = tangent_basis(c.mechanics.tilt_axis);
+    const int tilt = index(Parameter::kTiltAxis0);
+    return Matrix3<double>(B * c.covariance.block<2, 2>(tilt, tilt) * B.transpose());
+  };
+  const Matrix3<double> before =
+      of_tilt_in_space(with_centre_error(exact, free)) - of_tilt_in_space(exact);
+  exact.mechanics.tilt_axis = Vector3<double>(-0.0025, 1, -0.0022).normalized();
+  ASSERT_GT(
+      (tangent_basis(exact.mechanics.tilt_axis) - tangent_basis(free.mechanics.tilt_axis)).norm(),
+      1);
+  const Matrix3<double> beyond =
+      of_tilt_in_space(with_centre_error(exact, free)) - of_tilt_in_space(exact);
+  EXPECT_LT((beyond - before).norm(), 5e-3 * before.norm());  // the axes differ by 1e-3
+}
+
 // Another centre with the axes turned along: the optical axis looks in the same directions, from
 // another base.
 TEST(CentreFrame, AnotherCentreIsAnotherBase) {
