@@ -1,6 +1,7 @@
 #include "core/calibration/staged_adjustment.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdio>
@@ -14,6 +15,7 @@
 #include "core/calibration/noise_check.h"
 #include "core/calibration/rounded_telemetry.h"
 #include "core/calibration/shared_errors.h"
+#include "core/calibration/shimmer.h"
 #include "core/model/median.h"
 
 namespace alidade::internal {
@@ -140,14 +142,17 @@ StageStatus StagedAdjustment::adjust_on_inliers(CalibrationQuality* quality) {
   }
   quality->steps = adjustment_.steps_taken();
   if (!converged) {
+    const std::string haze = haze_text(*quality);
     return {CalibrationStatus::kNotConverged,
-            "the adjustment does not converge: the model does not describe these data; is the "
-            "image's size right, and are all tracks from one zoom?" +
-                doubt_};
+            "the adjustment does not converge" +
+                (haze.empty() ? ": the model does not describe these data; is the image's size "
+                                "right, and are all tracks from one zoom?" +
+                                    doubt_
+                              : haze)};
   }
   if (!hold_centre()) {
     return {CalibrationStatus::kNotConverged,
-            "the adjustment does not converge with the optical centre held"};
+            "the adjustment does not converge with the optical centre held" + haze_text(*quality)};
   }
   StageStatus status = allow_for_repetition(quality);
   if (!status.ok()) return status;
@@ -168,6 +173,20 @@ StageStatus StagedAdjustment::adjust_on_inliers(CalibrationQuality* quality) {
   release_centre();
   adjusted_.covariance += hidden_;
   return {};
+}
+
+// Continues a refusal; empty if the pictures do not shimmer.
+std::string StagedAdjustment::haze_text(const CalibrationQuality& quality) const {
+  const Shimmer shimmer = find_shimmer(selected_->data);
+  const double stated_px = shimmer.stated_px / quality.pixel_sigma_ratio;
+  if (!shimmer.is_haze(stated_px)) return {};
+  std::array<char, 300> text{};
+  std::snprintf(text.data(), text.size(),
+                ": haze: points of the pictures move to and fro against their neighbours by %.2g "
+                "px within 0.4 s, %.0f times the tracks' noise; record when the ground is cool, or "
+                "things that are nearer",
+                shimmer.rms_px, shimmer.rms_px / stated_px);
+  return text.data();
 }
 
 bool StagedAdjustment::settle_robustly() {
@@ -364,11 +383,12 @@ StageStatus StagedAdjustment::allow_for_repetition(CalibrationQuality* quality) 
   if (!adjustment_.minimise({}, 20, 1e-4, &adjusted_.state, &adjusted_.at) ||
       !adjustment_.covariance(adjusted_.at, &adjusted_.covariance, &telemetry_unknowns_)) {
     return {CalibrationStatus::kNotConverged,
-            "the adjustment does not converge with errors that repeat from frame to frame"};
+            "the adjustment does not converge with errors that repeat from frame to frame" +
+                haze_text(*quality)};
   }
   if (departs_ && !settle_known_departures()) {
     return {CalibrationStatus::kNotConverged,
-            "the adjustment does not converge with the telemetry's errors"};
+            "the adjustment does not converge with the telemetry's errors" + haze_text(*quality)};
   }
   return {};
 }
