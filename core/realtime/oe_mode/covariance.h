@@ -15,6 +15,9 @@ namespace alidade {
 // standard deviations). The solution and the filter of the map's offset use the same.
 inline constexpr double kMaxContradiction = 36;
 
+// The same where they do not exclude each other: chance is beyond it in one frame of a thousand.
+inline constexpr double kUsualContradiction = 13.8;
+
 // s; correlation time of the common error of the landmarks in view. The filter of the map's offset
 // and the track of the lens use the same.
 inline constexpr double kSharedCorrelation_s = 10;

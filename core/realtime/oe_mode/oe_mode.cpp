@@ -312,6 +312,11 @@ OeStatus OeMode::answer_with_landmarks(const PredictedMotion& predicted, const S
   sensitivity.topRows<2>() += added.sensitivity;
   covariance += sensitivity * calibration_.lens().unshared(offset_.lens()).asDiagonal() *
                 sensitivity.transpose();
+  if (solved.contradiction > kUsualContradiction) {
+    // Either may be wrong, and hardly by chance: what chance leaves of their difference is covered.
+    covariance.topLeftCorner<2, 2>() += (1 - kUsualContradiction / solved.contradiction) *
+                                        solved.innovation * solved.innovation.transpose();
+  }
   if (lens_is_learnt()) {
     if (own_lens() != nullptr) learn_own_lens(solution, motion.zoom_rate);
     calibration_.answer(frame_.lens, offset_.lens(), solved.lens.value, solved.lens.variance,
