@@ -36,7 +36,7 @@ enum class CalibrationActivity : std::uint8_t {
   kCollecting,  // no calibration for this camera at this zoom: waits for motion
   kAdjusting,   // computes a calibration
   kWatching,    // there is a calibration; new data tests and refines it
-  kDoubtful     // landmarks contradicted telemetry: the calibration is withdrawn, collects anew
+  kDoubtful     // the calibration is withdrawn (landmarks contradict telemetry), collects anew
 };
 
 // What would help the calibration.

@@ -50,8 +50,9 @@ class ContradictionJudge {
   int in_a_row_ = 0;
 };
 
-// Counts frames in which landmarks contradict telemetry. If they do in half of the frames of some
-// seconds, the calibration is withdrawn.
+// Counts frames of which something is true. SelfCalibration withdraws by it where landmarks
+// contradict telemetry in half of the frames of some seconds; StreamWatch counts old telemetry and
+// repeated pictures by judges of its own, which withdraw nothing.
 struct DisagreementOptions {
   double span_s = 8;              // the frames of this latest time are judged
   double share = 0.5;             // of these frames, 0 to 1
@@ -62,7 +63,7 @@ class DisagreementJudge {
  public:
   explicit DisagreementJudge(const DisagreementOptions& options = {}) : options_(options) {}
 
-  // True: the calibration must be withdrawn. time_s: not decreasing from call to call.
+  // True: in at least `share` of the frames. time_s: not decreasing from call to call.
   bool judge(double time_s, bool contradicted) {
     frames_.emplace_back(time_s, contradicted);
     while (frames_.front().first < time_s - options_.span_s) frames_.pop_front();

@@ -34,7 +34,7 @@ export const kActivities = {
   collecting: 'Not calibrated yet: watching how the camera moves.',
   adjusting: 'Computing a calibration.',
   watching: 'Calibrated. New motion is held against the calibration and refines it.',
-  doubtful: 'The calibration was withdrawn, as what the pictures show contradicts the pan/tilt readings. Watching anew.',
+  doubtful: 'The calibration was withdrawn: it no longer fits what is seen (the log says why). Watching anew.',
 };
 export const kNeeds = {
   'video': 'It needs video: no picture comes.',
