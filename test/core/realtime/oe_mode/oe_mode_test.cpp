@@ -260,6 +260,24 @@ TEST_F(OeModeOnFrames, CoversWhatLandmarksAndTelemetrySayWhereTheyExcludeEachOth
   expect_back(25);
 }
 
+// Five of its sigmas, as pictures that lag show: too little to be excluded, too much for chance.
+TEST_F(OeModeOnFrames, CoversWhatTelemetrySaysWhereChanceHardlyExplainsIt) {
+  start(20);
+  EXPECT_LT(frame_.motion_covariance(0, 0), 0.5 * 0.5 * kPixel * kPixel);
+  telemetry_ = camera_.telemetry(20);
+  telemetry_.angle.pan += 5 * kPixel;
+  ASSERT_EQ(oe_.process(camera_.image(20), VirtualCamera::time_s(20), &telemetry_, &frame_),
+            OeStatus::kOk);
+  EXPECT_EQ(frame_.mode, OrientationMode::kOe);
+  EXPECT_GT(frame_.motion_covariance(0, 0), 1.5 * 1.5 * kPixel * kPixel);
+  EXPECT_LT(frame_.motion_covariance(0, 0), 6 * 6 * kPixel * kPixel);
+  EXPECT_LT(frame_.motion_covariance(1, 1), 1.5 * 1.5 * kPixel * kPixel);
+  expect_honest(camera_, 20, frame_);
+  oe_.maintain();
+  run(21, 24);
+  EXPECT_LT(frame_.motion_covariance(0, 0), 0.5 * 0.5 * kPixel * kPixel);
+}
+
 TEST_F(OeModeOnFrames, GoesOnWithoutTelemetryWhileItSees) {
   start(30);
   // 0.3 s
