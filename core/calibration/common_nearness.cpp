@@ -66,7 +66,7 @@ std::string scene_problem(const Pupil& pupil, const SceneDistance& scene,
   std::snprintf(text, sizeof text,
                 "the pictures show distances that differ by more than a scene from %g to %g m "
                 "explains: from a pupil %.2g m before or behind the axes something is nearer than "
-                "%.2g m; correct the scene's distances, or the pupil's place",
+                "%.0f m; correct the scene's distances, or the pupil's place",
                 scene.nearest_m, scene.farthest_m, pupil_m, 1 / (far + 2 * least / pupil_m));
   return text;
 }
