@@ -186,6 +186,7 @@ void fill_result(const CalibrationInput& input, const CalibrationOptions& option
   result->calibration.covariance =
       physical_covariance(result->calibration, shares, state, adjusted.covariance);
   result->telemetry_error = adjusted.telemetry_error;
+  result->nearness = adjusted.nearness;
   result->trajectory = state.trajectory;
   fill_observations(selected, adjusted.at, result);
   fill_telemetry(selected, adjusted.at, result);

@@ -1,8 +1,8 @@
 #pragma once
 // calibration.yaml: one calibration as text for people to read and correct, in the model's units.
 // Absent values: aspect is 1, centre_offset 0 and exact, a sigma 0 (exact) unless the covariance
-// gives it. quality and landmarks belong to the run that wrote them: they are accepted and not
-// kept.
+// gives it. quality, landmarks, pupil_m, far_focal_length and holds_beyond_m belong to the run that
+// wrote them: they are accepted and not kept.
 // All else is strict. An unknown, missing or doubled key, text for a number, a number that is not
 // finite or looks like another unit is an error, `file:line: what; what would be right`.
 // Reading back what was written gives the same bits (zoom_curve: see zoom_text.h). Pure: touches no
@@ -28,6 +28,8 @@ struct CalibrationNotes {
   std::string landmarks;                                         // side file's name; empty: none
   ZoomCurve zoom_curve;                                          // empty: none
   TelemetryError telemetry_error;                                // none by default
+  Pupil pupil;                                       // as used; written if it was stated
+  std::optional<CalibrationPrior> far_focal_length;  // px, CalibrationResult
 };
 
 // Reads a text such as
@@ -40,6 +42,9 @@ struct CalibrationNotes {
 //   covariance: {names: [...], matrix: [[...]]}     optional; must agree with the sigmas
 //   zoom_curve: {...}                               optional: other readings, zoom_text.h
 //   pan_error, pan_play_rad ...: {...}              optional: telemetry_error_text.h
+//   pupil_m: {value: [0, 0, 0.06], sigma: [...]}    optional: pupil.h; right, down, forward
+//   far_focal_length: {value: 10660, sigma: 4}      optional: px, of far things
+//   holds_beyond_m: 180                             optional: pupil.h
 //   quality: {...}                                  optional: residuals, counts, priors, advice
 //   landmarks: map.bin                              optional: file beside this one
 // Without centre_offset the covariance does not name the centre either. False and one line in

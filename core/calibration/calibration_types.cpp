@@ -1,5 +1,6 @@
 #include "core/calibration/calibration_types.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 
@@ -7,11 +8,34 @@ namespace alidade {
 
 namespace {
 
-constexpr double kPupil_m = 0.05;  // usual, of lenses on heads
-// Spreads of the inverse distances, from 0: two sigmas, one to either side of the mean
-// (departures.cpp).
-constexpr double kCovered = 4;
-constexpr const char* kDifferentDistances = "different distances";
+// What is wrong with the pupil or the scene; empty: nothing.
+std::string problem_of_depth(const Pupil& pupil, const std::optional<SceneDistance>& scene) {
+  const auto number = [](double x) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%g", x);
+    return std::string(text);
+  };
+  for (int i = 0; i < 3; ++i) {
+    const double place = pupil.place_m[i];
+    if (std::abs(place) <= kFarthestPupil_m) continue;
+    return "a pupil " + number(std::abs(place)) +
+           " m from where the axes meet; give metres, at most " + number(kFarthestPupil_m) +
+           ", usually 0.02 to 0.1";
+  }
+  const auto sigma = pupil.sigma_m.array();
+  if (!(sigma >= 0).all() || !(sigma <= kFarthestPupil_m).all())
+    return "the pupil's sigma must be 0 to " + number(kFarthestPupil_m) + " m";
+  if (!scene) return {};
+  if (!(scene->nearest_m >= kNearestScene_m)) {
+    return "a scene at " + number(scene->nearest_m) + " m; give metres, at least " +
+           number(kNearestScene_m) + ": nearer things need another lens setting";
+  }
+  if (!(scene->nearest_m < scene->farthest_m)) {
+    return "a scene from " + number(scene->nearest_m) + " to " + number(scene->farthest_m) +
+           " m; give the nearest distance, then the farthest, which is larger";
+  }
+  return {};
+}
 
 }  // namespace
 
@@ -44,6 +68,8 @@ bool CalibrationOptions::validate(std::string* error) const {
     problem = "angle_accuracy_rad must not be negative";
   if (!(clock_offset_search_s > 0)) problem = "clock_offset_search_s must be positive";
   if (!(first_knot_spacing_s > 0)) problem = "first_knot_spacing_s must be positive";
+  const std::string of_depth = problem_of_depth(pupil, scene);
+  if (problem == nullptr && !of_depth.empty()) problem = of_depth.c_str();
   if (problem != nullptr && error != nullptr) *error = problem;
   return problem == nullptr;
 }
@@ -120,14 +146,19 @@ std::vector<std::string> CalibrationQuality::describe_departures() const {
   for (const CalibrationCause& c : causes) {
     lines.push_back((&c == &causes.front() ? "likeliest cause: " : "beside it: ") + c.cause + ", " +
                     number(c.size) + " " + c.unit + "; the sigmas have what it does");
-    if (c.cause == kDifferentDistances && c.size > 0) {
-      lines.push_back("the focal length's sigma covers things farther than " +
-                      number(1e3 * kPupil_m / (kCovered * c.size)) +
-                      " m, if the lens's pupil lies " + number(100 * kPupil_m) +
-                      " cm before or behind the axes");
-    }
   }
   return lines;
+}
+
+std::optional<CalibrationPrior> CalibrationResult::far_focal_length() const {
+  if (!nearness) return std::nullopt;
+  const double f = calibration.camera.focal_length;
+  // Its variance has the square of the nearness, which is its error for far things.
+  const double relative = relative_focal_length_sigma(calibration);
+  const double variance = std::max(relative * relative - nearness->value * nearness->value,
+                                   nearness->sigma * nearness->sigma);
+  const double far = f * std::exp(-nearness->value);
+  return CalibrationPrior{far, far * std::sqrt(variance)};
 }
 
 const char* to_string(CalibrationStatus status) {

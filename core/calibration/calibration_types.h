@@ -11,6 +11,7 @@
 
 #include "core/calibration/trajectory_spline.h"
 #include "core/model/calibration.h"
+#include "core/model/pupil.h"
 #include "core/model/telemetry_error.h"
 
 namespace alidade {
@@ -92,6 +93,11 @@ struct CalibrationOptions {
   // errors that vary slowly over the whole visited range. The recording cannot show such errors, as
   // they look like a scale. 0: no claim; the priors of the scales hold as they are.
   double angle_accuracy_rad = 0;
+  // A pupil before the axes makes near things look larger, which no residual shows if all are
+  // equally near. The focal length is that of what is in view. With a scene its sigma also covers
+  // far things, as well as pupil, scene and pictures tell.
+  Pupil pupil;
+  std::optional<SceneDistance> scene;
 
   StampNoise image_stamps = StampNoise::kSymmetric;
   StampNoise telemetry_stamps = StampNoise::kSymmetric;
@@ -252,6 +258,10 @@ struct CalibrationResult {
   std::vector<TelemetryResidual> telemetry_residuals;
   CalibrationExclusions exclusions;
   CalibrationQuality quality;
+  std::optional<Nearness> nearness;  // of what is in view; empty: no scene was stated
+
+  // px, of things so far away that the pupil's place does not matter. Empty: no scene was stated.
+  [[nodiscard]] std::optional<CalibrationPrior> far_focal_length() const;
 
   [[nodiscard]] bool ok() const { return status == CalibrationStatus::kOk; }
 };

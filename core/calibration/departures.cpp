@@ -7,7 +7,6 @@
 #include <string>
 #include <utility>
 
-#include "core/calibration/centre_frame.h"
 #include "core/calibration/chance.h"
 #include "core/calibration/departure_score.h"
 #include "core/calibration/depth_spread.h"
@@ -26,10 +25,6 @@ constexpr double kUsualFifthOrder = 0.003;
 constexpr double kFifthOfThird = 0.2;
 // What the other unknowns leave of a combination of columns; less is theirs.
 constexpr double kLeastLeft = 1e-6;
-
-// Mean of the inverse distances over their spread: 1 to 5 in scenes whose farthest thing is 30 to 2
-// times as far as the nearest.
-constexpr double kCommonDepth = 2;
 
 constexpr int kGearKnots = 12;
 constexpr int kDriftKnots = 8;
@@ -290,22 +285,6 @@ CalibrationCause cause_of(const DepthSpread& spread) {
           "per mille of the focal length"};
 }
 
-// What all landmarks' nearness has in common: a focal length, and, of a pupil beside the optical
-// axis, a turn of the axes with camera frame and base. variance: of either.
-GlobalMatrix common_nearness(const AdjustmentState& state, const Adjustment& adjustment,
-                             double variance) {
-  Calibration of_state;
-  of_state.camera = state.camera;
-  of_state.mechanics = state.mechanics;
-  Eigen::Matrix<double, kGlobalCount, 3> moved = Eigen::Matrix<double, kGlobalCount, 3>::Zero();
-  moved(index(Parameter::kFocalLength), 0) = 1;
-  moved.block<kParameterCount, 2>(0, 1) = state.camera.focal_length * axes_by_centre(of_state);
-  for (int p = 0; p < kGlobalCount; ++p) {
-    if (adjustment.fixed()[static_cast<std::size_t>(p)]) moved.row(p).setZero();
-  }
-  return variance * moved * moved.transpose();
-}
-
 }  // namespace
 
 Departures find_departures(const Adjustment& adjustment, const AdjustmentState& state,
@@ -377,17 +356,16 @@ Departures find_departures(const Adjustment& adjustment, const AdjustmentState& 
   }
   if (!state.nearness.empty()) {
     found.depth = nearness_spread(state, at);
+    found.depth_is_shown = true;
     found.depth_is_likeliest = true;
     found.causes.insert(found.causes.begin(), cause_of(found.depth));
-    found.error +=
-        common_nearness(state, adjustment, std::pow(kCommonDepth * found.depth.sigma, 2));
   } else {
     found.depth = depth_spread(adjustment, state, at, factor);
     found.depth_is_likeliest = found.depth.log_chance < likeliest;
-    if (found.depth.log_chance < limit) {
+    found.depth_is_shown = found.depth.log_chance < limit;
+    if (found.depth_is_shown) {
       found.causes.insert(found.depth_is_likeliest ? found.causes.begin() : found.causes.end(),
                           cause_of(found.depth));
-      add_to_focal_length(std::pow(kCommonDepth * found.depth.sigma, 2));
     }
   }
   if (found.causes.empty()) return found;

@@ -25,6 +25,7 @@ struct Departures {
   GlobalMatrix error = GlobalMatrix::Zero();
   GlobalMatrix hidden = GlobalMatrix::Zero();
   DepthSpread depth;                // of different distances
+  bool depth_is_shown = false;      // beyond chance; error does not have what it does
   bool depth_is_likeliest = false;  // more so than all other causes
 };
 

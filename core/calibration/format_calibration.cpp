@@ -69,6 +69,32 @@ void write_quality(const CalibrationNotes& notes, YAML::Emitter* out) {
   *out << YAML::EndMap;
 }
 
+void write_distances(const CalibrationNotes& notes, double relative_sigma, YAML::Emitter* out) {
+  const Pupil usual;
+  const Pupil& pupil = notes.pupil;
+  const auto write = [out](const char* name, const Vector3<double>& v) {
+    *out << YAML::Key << name << YAML::Value << YAML::BeginSeq << exact_text(v.x())
+         << exact_text(v.y()) << exact_text(v.z()) << YAML::EndSeq;
+  };
+  if (pupil.place_m != usual.place_m || pupil.sigma_m != usual.sigma_m) {
+    *out << YAML::Key << "pupil_m" << YAML::Value << YAML::Flow << YAML::BeginMap;
+    write("value", pupil.place_m);
+    write("sigma", pupil.sigma_m);
+    *out << YAML::EndMap << YAML::Comment("right, down, forward of where the axes meet");
+  }
+  if (notes.far_focal_length) {
+    *out << YAML::Key << "far_focal_length" << YAML::Value << YAML::Flow << YAML::BeginMap
+         << YAML::Key << "value" << YAML::Value << exact_text(notes.far_focal_length->value)
+         << YAML::Key << "sigma" << YAML::Value << exact_text(notes.far_focal_length->sigma)
+         << YAML::EndMap << YAML::Comment("px, of far things; focal_length is of what was in view");
+  }
+  if (const double beyond_m = holds_beyond_m(pupil, relative_sigma);
+      beyond_m > 0 && std::isfinite(beyond_m)) {
+    *out << YAML::Key << "holds_beyond_m" << YAML::Value << short_text(beyond_m)
+         << YAML::Comment("nearer, the pupil does more than a sigma of the focal length");
+  }
+}
+
 }  // namespace
 
 std::vector<Parameter> parameters_of(const Calibration& calibration) {
@@ -131,6 +157,7 @@ std::string format_calibration(const Calibration& calibration, const Calibration
                "s; telemetry clock = image clock + clock_offset");
   if (calibration.zoom) out << YAML::Key << "zoom" << YAML::Value << exact_text(*calibration.zoom);
   internal::write_telemetry_error(notes.telemetry_error, &out);
+  write_distances(notes, relative_focal_length_sigma(calibration), &out);
   if (!cov.isZero(0)) {
     out << YAML::Key << "covariance" << YAML::Value << YAML::BeginMap << YAML::Key << "names"
         << YAML::Value << YAML::Flow << YAML::BeginSeq;

@@ -69,11 +69,11 @@ class CalibrationReader {
   Calibration read() {
     file_.check_top(
         "a calibration",
-        {"format",        "image",        "focal_length",  "aspect",     "radial_distortion",
-         "centre_offset", "zoom_curve",   "line_delay",    "pan_axis",   "tilt_axis",
-         "pan_scale",     "tilt_scale",   "clock_offset",  "zoom",       "pan_error",
-         "tilt_error",    "pan_play_rad", "tilt_play_rad", "covariance", "quality",
-         "landmarks"});
+        {"format",        "image",        "focal_length",     "aspect",        "radial_distortion",
+         "centre_offset", "zoom_curve",   "line_delay",       "pan_axis",      "tilt_axis",
+         "pan_scale",     "tilt_scale",   "clock_offset",     "zoom",          "pan_error",
+         "tilt_error",    "pan_play_rad", "tilt_play_rad",    "covariance",    "quality",
+         "landmarks",     "pupil_m",      "far_focal_length", "holds_beyond_m"});
     const YAML::Node& root = file_.root();
     file_.read_image(&calibration_.camera.width, &calibration_.camera.height);
 
@@ -96,6 +96,11 @@ class CalibrationReader {
     calibration_.clock_offset = scalar(Parameter::kClockOffset);
     if (root["zoom"]) calibration_.zoom = file_.number(root["zoom"], "zoom");
     telemetry_error_ = internal::read_telemetry_error(file_);
+    if (root["pupil_m"]) check_pupil();
+    if (root["far_focal_length"]) check_far_focal_length();
+    if (root["holds_beyond_m"] && !(file_.number(root["holds_beyond_m"], "holds_beyond_m") > 0)) {
+      file_.fail(root["holds_beyond_m"], "holds_beyond_m is not more than 0; give metres");
+    }
     if (root["quality"] && !root["quality"].IsMap()) {
       file_.fail(root["quality"], "quality is not a map; write `quality: {name: value, ...}`");
     }
@@ -125,6 +130,27 @@ class CalibrationReader {
     }
     sigmas_.push_back({parameter, sigma, node});
     calibration_.covariance(index(parameter), index(parameter)) = sigma * sigma;
+  }
+
+  void check_pupil() const {
+    const YAML::Node entry = file_.entry("pupil_m");
+    for (const char* key : {"value", "sigma"}) {
+      const YAML::Node node = file_.required(entry, key, "pupil_m.");
+      for (const double metres : file_.numbers(node, std::string("pupil_m.") + key, 3)) {
+        if (std::abs(metres) <= kFarthestPupil_m) continue;
+        file_.fail(node, std::string("pupil_m.") + key + " has " + short_text(metres) +
+                             "; give metres, at most " + short_text(kFarthestPupil_m));
+      }
+    }
+  }
+
+  void check_far_focal_length() const {
+    const std::string name = "far_focal_length";
+    const YAML::Node entry = file_.entry(name);
+    static_cast<void>(file_.value(entry, name, plausible_range(Parameter::kFocalLength)));
+    const YAML::Node sigma = file_.required(entry, "sigma", name + ".");
+    if (!(file_.number(sigma, name + ".sigma") >= 0))
+      file_.fail(sigma, name + ".sigma is less than 0; give px, one standard deviation");
   }
 
   double scalar(Parameter parameter) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/calibration/axes_turn.h"
+#include "core/calibration/common_nearness.h"
 #include "core/calibration/contradictions.h"
 #include "core/calibration/departures.h"
 #include "core/calibration/knot_choice.h"
@@ -98,7 +99,9 @@ StagedAdjustment::StagedAdjustment(const StartValues& start, const TelemetryAngl
       adjustment_(selected->data, with_nearness(start.prior.priors, nearness_sigma),
                   start.prior.fixed),
       departures_(start.prior.fixed, noise.resolution_rad, options.angle_accuracy_rad),
-      nearness_sigma_(nearness_sigma) {
+      nearness_sigma_(nearness_sigma),
+      pupil_(options.pupil),
+      scene_(options.scene) {
   start_ = start.state;
   adjusted_.state = start.state;
 }
@@ -158,6 +161,10 @@ StageStatus StagedAdjustment::adjust_on_inliers(CalibrationQuality* quality) {
   if (!status.ok()) return status;
   allow_for_shared_errors();
   allow_for_contradictions(quality);
+  if (scene_ && nearness_sigma_ > 0) {
+    std::string problem = scene_problem(pupil_, *scene_, depth_);
+    if (!problem.empty()) return {CalibrationStatus::kBadInput, std::move(problem)};
+  }
   if (departs_) {
     adjusted_.covariance += departures_.covariance();
     adjusted_.telemetry_error = departures_.error();
@@ -404,6 +411,7 @@ void StagedAdjustment::allow_for_shared_errors() {
 void StagedAdjustment::allow_for_contradictions(CalibrationQuality* quality) {
   ReducedFactor factor;
   if (adjusted_.at.H.rows() > kLargestChecked || !adjustment_.factorise(adjusted_.at, &factor)) {
+    allow_for_common_nearness();
     return;
   }
   const auto& times = selected_->data.frame_time_s;
@@ -418,9 +426,11 @@ void StagedAdjustment::allow_for_contradictions(CalibrationQuality* quality) {
   const Departures departures =
       find_departures(adjustment_, adjusted_.state, adjusted_.at, factor, lens_growth);
   quality->causes = departures.causes;
+  if (departures.depth_is_shown) depth_ = departures.depth;
   if (departures.depth_is_likeliest && nearness_sigma_ == 0)
     seen_nearness_ = departures.depth.sigma;
   adjusted_.covariance += departures.error;
+  allow_for_common_nearness();
   hidden_ = departures.hidden;
   // What landmarks and frames have in common is part of what parts show.
   GlobalVector root = GlobalVector::Ones();
@@ -434,6 +444,19 @@ void StagedAdjustment::allow_for_contradictions(CalibrationQuality* quality) {
   const int p = check.worst.parameter;
   quality->contradiction = {p == kDrift ? "clock_drift" : to_string(static_cast<Parameter>(p)),
                             check.worst.between, check.worst.scatter};
+}
+
+// The focal length stays that of what is in view; its sigma covers far things.
+void StagedAdjustment::allow_for_common_nearness() {
+  const Nearness common = common_nearness(pupil_, scene_, depth_.sigma);
+  if (scene_) adjusted_.nearness = common;
+  if (nearness_sigma_ > 0) {
+    adjusted_.covariance -=
+        part_of_mean_nearness(adjusted_.state, adjusted_.at, nearness_sigma_, &adjustment_);
+  }
+  const int f = index(Parameter::kFocalLength);
+  if (adjustment_.fixed()[static_cast<std::size_t>(f)]) return;
+  adjusted_.covariance(f, f) += common.value * common.value + common.sigma * common.sigma;
 }
 
 }  // namespace alidade::internal

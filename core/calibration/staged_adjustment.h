@@ -2,11 +2,13 @@
 // StagedAdjustment: fifth stage of calibrate(), the adjustment (adjustment.h) from rough start
 // values to the final covariance. Allocates; one object for each recording.
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "core/calibration/adjustment.h"
 #include "core/calibration/centre_share.h"
+#include "core/calibration/depth_spread.h"
 #include "core/calibration/drifting_tracks.h"
 #include "core/calibration/input_selection.h"
 #include "core/calibration/stage_status.h"
@@ -21,6 +23,7 @@ struct Adjusted {
   Linearisation at;
   GlobalMatrix covariance = GlobalMatrix::Zero();
   TelemetryError telemetry_error;
+  std::optional<Nearness> nearness;  // of what is in view; empty: no scene was stated
 };
 
 class StagedAdjustment {
@@ -43,8 +46,10 @@ class StagedAdjustment {
   // marked again. Noise levels that the residuals contradict beyond chance are replaced by the
   // residuals' (noise_check.h). The covariance grows if residuals move the parameters together
   // (shared_errors.h), and if parts of the recording contradict each other (contradictions.h); the
-  // optical centre is held meanwhile (centre_share.h). Sets the quality's steps, ratios, repetition
-  // and contradiction. After adjust_robustly().
+  // optical centre is held meanwhile (centre_share.h). The focal length's share grows by what all
+  // distances have in common (common_nearness.h); a stated scene that the pictures contradict is
+  // bad input. Sets the quality's steps, ratios, repetition and contradiction. After
+  // adjust_robustly().
   [[nodiscard]] StageStatus adjust_on_inliers(CalibrationQuality* quality);
 
   // After adjust_on_inliers() returned ok.
@@ -72,6 +77,7 @@ class StagedAdjustment {
   [[nodiscard]] StageStatus allow_for_repetition(CalibrationQuality* quality);
   void allow_for_shared_errors();
   void allow_for_contradictions(CalibrationQuality* quality);
+  void allow_for_common_nearness();
 
   SelectedInput* selected_;
   TelemetryAngleNoise noise_;
@@ -94,6 +100,9 @@ class StagedAdjustment {
   int drifting_ = 0;  // observations
   double nearness_sigma_;
   double seen_nearness_ = 0;
+  Pupil pupil_;
+  std::optional<SceneDistance> scene_;
+  DepthSpread depth_;  // shown by the pictures; 0: nothing
 };
 
 }  // namespace alidade::internal

@@ -74,6 +74,11 @@ void set_priors(const CalibrateOptions& options, int width, CalibrationOptions* 
   calibration->centre_sigma_px = options.centre_sigma_px.value_or(kUsualCentreShare * width);
   if (options.angle_accuracy_deg)
     calibration->angle_accuracy_rad = *options.angle_accuracy_deg * kPi / 180;
+  if (options.pupil_m.size() == 3)
+    calibration->pupil = {Vector3<double>(options.pupil_m.data()),
+                          Vector3<double>::Constant(kStatedPupilSigma_m)};
+  if (options.scene_distance_m.size() == 2)
+    calibration->scene = SceneDistance{options.scene_distance_m[0], options.scene_distance_m[1]};
   std::string error;
   if (!calibration->validate(&error)) throw CommandError(kExitUsage, error);
 }
@@ -179,7 +184,9 @@ int calibrate_one(const CalibrateOptions& options, CalibrationJob job, StopSigna
                                                  stated_priors(job.options),
                                                  "map.bin",
                                                  {},
-                                                 result.telemetry_error};
+                                                 result.telemetry_error,
+                                                 job.options.pupil,
+                                                 result.far_focal_length()};
                     return save_calibration(path, result.calibration, notes, error);
                   });
   }

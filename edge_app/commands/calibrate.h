@@ -25,6 +25,8 @@ struct CalibrateOptions {
   std::optional<double> scale_sigma;         // of pan_scale and tilt_scale; empty: their default
   std::optional<double> centre_sigma_px;     // empty: kUsualCentreShare of the width
   std::optional<double> angle_accuracy_deg;  // CalibrationOptions::angle_accuracy_rad; empty: 0
+  std::vector<double> pupil_m;               // Pupil::place_m; empty: the usual one
+  std::vector<double> scene_distance_m;      // nearest and farthest; empty: nothing is known
 };
 
 // Calibrates from one recording, or from all of them together if they differ in zoom. Returns the

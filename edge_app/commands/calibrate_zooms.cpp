@@ -218,6 +218,7 @@ int calibrate_zooms(const CalibrateOptions& options, std::vector<CalibrationJob>
   directory.add("calibration", "calibration.yaml", [&](const std::string& path, std::string* why) {
     CalibrationNotes notes;
     notes.zoom_curve = fit.curve;
+    notes.pupil = jobs.front().options.pupil;
     return save_calibration(path, first, notes, why);
   });
   std::fputs(options.json ? zooms_json(fit, nodes, movements.size(), directory).c_str()

@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <memory>
 #include <optional>
@@ -11,6 +12,7 @@
 #include <vector>
 
 #include "core/calibration/number_text.h"
+#include "core/model/pupil.h"
 #include "edge_app/commands/calibrate.h"
 #include "edge_app/commands/calibrate_shutter.h"
 #include "edge_app/commands/check.h"
@@ -63,6 +65,21 @@ std::string is_length_px(const std::string& text) {
   return value && *value >= 0 && *value <= 1e4
              ? ""
              : fmt::format("'{}' is not a number of pixels from 0 to 10000", text);
+}
+
+std::string is_pupil_place(const std::string& text) {
+  const std::optional<double> value = number_of(text);
+  return value && std::abs(*value) <= kFarthestPupil_m
+             ? ""
+             : fmt::format("'{0}' is not a number of metres from -{1:g} to {1:g}", text,
+                           kFarthestPupil_m);
+}
+
+std::string is_scene_distance(const std::string& text) {
+  const std::optional<double> value = number_of(text);
+  return value && *value >= kNearestScene_m
+             ? ""
+             : fmt::format("'{}' is not a number of metres, {:g} or more", text, kNearestScene_m);
 }
 
 void add_run(CLI::App& app, int* exit_code) {
@@ -208,6 +225,24 @@ void add_calibrate(CLI::App& app, int* exit_code) {
                    "pan_tilt_accuracy_rad, or none): the focal length is known to no better than "
                    "this over the range of pan")
       ->check(is_accuracy)
+      ->group(group);
+  command
+      ->add_option("--scene-distance", options->scene_distance_m,
+                   "NEAREST,FARTHEST, m; how far away what is in view is (default: nothing is "
+                   "known): the focal length's sigma covers far things, and theirs is told, too")
+      ->delimiter(',')
+      ->expected(2)
+      ->type_name("METRES")
+      ->check(is_scene_distance)
+      ->group(group);
+  command
+      ->add_option("--pupil", options->pupil_m,
+                   "RIGHT,DOWN,FORWARD, m; the lens's entrance pupil from where pan and tilt axis "
+                   "meet (default: 0, one sigma 0.05)")
+      ->delimiter(',')
+      ->expected(3)
+      ->type_name("METRES")
+      ->check(is_pupil_place)
       ->group(group);
   command->callback([options, exit_code] { *exit_code = calibrate_recordings(*options); });
 }

@@ -113,6 +113,8 @@ Calibrating begin_calibrating(const Config& config, const std::string& path,
   options.adjustment.centre_sigma_px =
       config.camera.centre_sigma_px.value_or(kUsualCentreShare * camera.width);
   options.adjustment.angle_accuracy_rad = config.pan_tilt.angle_accuracy_deg * kPi / 180;
+  options.adjustment.pupil = config.camera.pupil;
+  options.adjustment.scene = config.scene;
   options.zoom_tolerance = config.calibration.zoom_tolerance;
   options.zooms = config.camera.focal_length_range.has_value();
   options.automatic = config.calibration.automatic;

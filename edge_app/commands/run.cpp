@@ -184,6 +184,9 @@ int run_live(const RunOptions& options) {
     return self != nullptr && self->ask_for_fresh();
   };
   sources.plane = plane;
+  sources.pupil = config.camera.pupil;
+  if (config.scene)
+    sources.scene_nearness = scene_nearness(config.camera.pupil, *config.scene).value;
   sources.fit_plane = answer_plane_fit;
   if (targets) {
     sources.targets = &targets->feed();

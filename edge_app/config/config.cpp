@@ -48,12 +48,31 @@ CameraConfig read_camera(YamlSection section) {
   camera.radial_distortion =
       section.number("radial_distortion", {-1e8, 1e8, "1"}).value_or(camera.radial_distortion);
   camera.centre_sigma_px = section.number("centre_sigma_px", {0, 1e4, "px"});
+  if (const auto place = section.numbers("pupil_m", 3, {-kFarthestPupil_m, kFarthestPupil_m, "m"}))
+    camera.pupil = {Vector3<double>(place->data()), Vector3<double>::Constant(kStatedPupilSigma_m)};
   camera.line_delay_s =
       section.number("line_delay_s", {-1e-3, 1e-3, "s/row"}).value_or(camera.line_delay_s);
   camera.upside_down = section.truth("upside_down").value_or(camera.upside_down);
   static_cast<void>(section.choice("zoom", {"fixed"}));
   section.finish();
   return camera;
+}
+
+std::optional<SceneDistance> read_scene(YamlSection section) {
+  constexpr NumberRange kDistances{kNearestScene_m, 1e9, "m"};
+  const std::optional<double> nearest = section.number("nearest_m", kDistances);
+  const std::optional<double> farthest = section.number("farthest_m", kDistances);
+  section.finish();
+  if (!nearest && !farthest) return std::nullopt;
+  if (!nearest) section.fail_missing("nearest_m", "give how near the nearest thing in view is, m");
+  SceneDistance scene{*nearest};
+  if (farthest) scene.farthest_m = *farthest;
+  if (!(scene.nearest_m < scene.farthest_m)) {
+    section.fail("farthest_m", fmt::format("is {:g} m and nearest_m is {:g} m; farthest_m is the "
+                                           "larger of the two",
+                                           scene.farthest_m, scene.nearest_m));
+  }
+  return scene;
 }
 
 CalibrationConfig read_calibration(YamlSection section, const std::string& path) {
@@ -308,6 +327,7 @@ void read_config(YamlSection& top, const std::string& path, ConfigScope scope, C
   const YamlSection video = top.section("video");
   const YamlSection pan_tilt = top.section("pan_tilt");
   const YamlSection camera = top.section("camera");
+  const YamlSection scene = top.section("scene");
   const YamlSection calibration = top.section("calibration");
   const YamlSection scene_map = top.section("scene_map");
   const YamlSection realtime = top.section("realtime");
@@ -326,6 +346,7 @@ void read_config(YamlSection& top, const std::string& path, ConfigScope scope, C
   if (top.has("video")) config->video = read_video(video, path);
   if (top.has("pan_tilt")) config->pan_tilt = read_pan_tilt(pan_tilt, path);
   config->camera = read_camera(camera);
+  config->scene = read_scene(scene);
   config->calibration = read_calibration(calibration, path);
   config->scene_map = read_scene_map(scene_map, path);
   config->realtime = read_realtime(realtime);

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "core/model/pupil.h"
 #include "core/realtime/telemetry/telemetry_buffer.h"  // TelemetryLimits
 #include "edge_app/config/detectors_config.h"
 #include "edge_app/config/mqtt_config.h"
@@ -41,6 +42,7 @@ struct CameraConfig {
   double line_delay_s = 0;  // s/row, of the sensor read from top to bottom
   // The camera hangs upside down and turns its image by 180 degrees; negates line_delay_s.
   bool upside_down = false;
+  Pupil pupil;  // as stated, or the usual one
 };
 
 struct CalibrationConfig {
@@ -84,6 +86,7 @@ struct Config {
   VideoConfig video;
   PanTiltConfig pan_tilt;
   CameraConfig camera;
+  std::optional<SceneDistance> scene;  // of what the camera sees; empty: nothing is known
   CalibrationConfig calibration;
   SceneMapConfig scene_map;
   RealtimeConfig realtime;

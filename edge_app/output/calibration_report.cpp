@@ -65,6 +65,18 @@ void parameters(ReportPage& page) {
       "</tbody>\n</table></div>\n<p class=\"soft\">sigma: one standard deviation, noise of image, "
       "telemetry and stamps included. Axes: in the base (forward, right, down), sigma of the two "
       "components in the tangent plane.</p>\n");
+  const std::string beyond = holds_beyond(page.result(), page.report().options);
+  if (!beyond.empty()) {
+    page.add(
+        "<p class=\"soft\">Holds for {}. What is known of the distances and of the pupil: "
+        "--scene-distance, --pupil; scene, camera.pupil_m.</p>\n",
+        beyond);
+  }
+  const std::string far = far_focal_length_text(page.result());
+  if (!far.empty()) {
+    page.add("<p class=\"soft\">Focal length of far things, as scene and pupil tell: {}.</p>\n",
+             far);
+  }
   const std::string granted = taken_for_granted(page.result(), page.report().options);
   if (granted.empty()) return;
   page.add(

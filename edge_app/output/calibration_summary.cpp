@@ -101,6 +101,23 @@ std::string taken_for_granted(const CalibrationResult& result, const Calibration
                      range / kDegree);
 }
 
+std::string holds_beyond(const CalibrationResult& result, const CalibrationOptions& options) {
+  const double beyond_m =
+      holds_beyond_m(options.pupil, relative_focal_length_sigma(result.calibration));
+  if (!(beyond_m > 0) || !std::isfinite(beyond_m)) return {};
+  const double digit_m = std::pow(10, std::floor(std::log10(beyond_m)) - 1);
+  return fmt::format(
+      "things farther than {:g} m: nearer, a lens's pupil {:.2g} cm before or behind the axes does "
+      "more than one sigma of the focal length",
+      digit_m * std::round(beyond_m / digit_m),
+      100 * (std::abs(options.pupil.place_m.z()) + options.pupil.sigma_m.z()));
+}
+
+std::string far_focal_length_text(const CalibrationResult& result) {
+  const auto far = result.far_focal_length();
+  return far ? estimate_text(far->value, far->sigma, "px") : "";
+}
+
 std::string summary_text(const CalibrationResult& result, const CalibrationOptions& options) {
   std::vector<SummaryRow> rows = {{"parameter", "value", "sigma", "unit", "prior"}};
   const std::vector<SummaryRow> parameters = summary_rows(result, options);
@@ -139,6 +156,10 @@ std::string summary_text(const CalibrationResult& result, const CalibrationOptio
   }
   if (const std::string granted = taken_for_granted(result, options); !granted.empty())
     text += "focal length's sigma takes for granted: " + granted + "\n";
+  if (const std::string beyond = holds_beyond(result, options); !beyond.empty())
+    text += "holds for " + beyond + "\n";
+  if (const std::string far = far_focal_length_text(result); !far.empty())
+    text += "focal length of far things, as scene and pupil tell: " + far + "\n";
   for (const std::string& line : quality.advice) text += "advice: " + line + "\n";
   return text;
 }
@@ -215,6 +236,12 @@ std::string summary_json(const CalibrationResult& result, const CalibrationOptio
   }
   if (const std::string granted = taken_for_granted(result, options); !granted.empty())
     json["taken_for_granted"] = granted;
+  if (const double beyond_m =
+          holds_beyond_m(options.pupil, relative_focal_length_sigma(result.calibration));
+      beyond_m > 0 && std::isfinite(beyond_m))
+    json["holds_beyond_m"] = beyond_m;
+  if (const auto far = result.far_focal_length())
+    json["far_focal_length"] = {{"value", far->value}, {"sigma", far->sigma}};
   json["excluded"] = result.exclusions.describe();
   json["files"] = ordered_json::object();
   for (const auto& [kind, path] : files) json["files"][kind] = path;

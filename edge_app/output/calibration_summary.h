@@ -23,6 +23,13 @@ struct SummaryRow {
 std::vector<SummaryRow> summary_rows(const CalibrationResult& result,
                                      const CalibrationOptions& options);
 
+// For which distances the calibration holds: "things farther than 180 m: ...". Empty: the focal
+// length has no sigma.
+std::string holds_beyond(const CalibrationResult& result, const CalibrationOptions& options);
+
+// The focal length of far things, with a stated scene: "10670 +- 5 px". Else empty.
+std::string far_focal_length_text(const CalibrationResult& result);
+
 // The assumption about the head on which the sigma of f rests: a recording does not show an error
 // that changes as slowly as the range of angles that was visited. Empty: the maker's claim is
 // stated, or f has no such sigma.

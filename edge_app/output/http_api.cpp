@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <memory>
 #include <mutex>
 #include <nlohmann/json.hpp>
@@ -77,7 +78,10 @@ ServerResponse calibration(const HttpApiSources& sources) {
         404,
         "no calibration is in use for this camera at this zoom: there is none yet, or "
         "it was withdrawn; calibration.activity of /api/v1/status says which");
-  Json json = calibration_json(unpack(newest->camera));
+  const Calibration in_use = unpack(newest->camera);
+  Json json = calibration_json(in_use);
+  const double beyond_m = holds_beyond_m(sources.pupil, relative_focal_length_sigma(in_use));
+  if (beyond_m > 0 && std::isfinite(beyond_m)) json["holds_beyond_m"] = beyond_m;
   if (const auto curve = zoom_curve_of(sources)) json["zoom_curve"] = zoom_curve_json(*curve);
   if (const auto error = sources.telemetry_error ? sources.telemetry_error() : nullptr) {
     json.update(telemetry_error_json(*error));
@@ -176,7 +180,8 @@ ServerResponse directions(const HttpApiSources& sources, const std::string& body
   OrientationRecord record;
   ServerResponse refusal;
   if (!choose_record(sources, query.which, &record, &refusal)) return refusal;
-  return text_response("application/json", direction_answer(record, query, sources.plane.get()));
+  return text_response("application/json", direction_answer(record, query, sources.plane.get(),
+                                                            sources.pupil, sources.scene_nearness));
 }
 
 ServerResponse pixels(const HttpApiSources& sources, const std::string& body) {

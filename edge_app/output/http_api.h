@@ -8,6 +8,7 @@
 #include <string>
 
 #include "core/ground/plane_estimate.h"
+#include "core/model/pupil.h"
 #include "edge_app/output/http/http_server.h"
 #include "edge_app/output/live_state.h"
 #include "edge_app/output/mqtt_publisher.h"
@@ -31,6 +32,9 @@ struct HttpApiSources {
   // The errors by which the telemetry is corrected; may return null, and may be an empty function.
   std::function<std::shared_ptr<const TelemetryError>()> telemetry_error;
   std::shared_ptr<const PlaneEstimate> plane;  // null: none is configured
+  // Of directions of things at a known distance; the nearness of the scene that is in view.
+  Pupil pupil;
+  double scene_nearness = 0;
   // Fits the ground plane. body and *answer are JSON; false with one line in *error.
   std::function<bool(const std::string& body, std::string* answer, std::string* error)> fit_plane;
   // Both null if nothing is tracked. They must live as long as `live`, and wake the server, too.

@@ -20,6 +20,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr int kDeepest = 3;  // {"pixels": [[u, v]]}
 constexpr double kLargestSigma_px = 1e3;
+constexpr double kLargestDistance_m = 1e9;
 
 // An array of 1 to kMaxQueryItems arrays of n finite numbers.
 template <int n>
@@ -77,6 +78,23 @@ Matrix2<double> pixel_noise(const FrameOrientation& frame, const Vector2<double>
   return J * J.transpose();
 }
 
+// *d_b: from seen by the pupil to seen from the axes; what that leaves open is added to *cov. False
+// if the thing is nearer than the pupil.
+bool correct_for_distance(const FrameOrientation& frame, const Vector2<double>& u,
+                          const Pupil& pupil, double scene_nearness, double distance_m,
+                          Vector3<double>* d_b, Matrix2<double>* cov) {
+  const Mechanics<double>& mechanics = frame.calibration.mechanics;
+  const Matrix3<double> R = R_base_from_camera(
+      mechanics, angle_at_row(frame.motion(), frame.calibration.line_delay, u.y()));
+  const Vector3<double> before = *d_b;
+  Matrix2<double> of_pupil;
+  const Vector3<double> seen = seen_by_pupil(R, before, scene_nearness);
+  if (!direction_from_axes(pupil, R, seen, distance_m, 0, d_b, &of_pupil)) return false;
+  const Matrix2<double> turn = tangent_basis(*d_b).transpose() * tangent_basis(before);
+  *cov = turn * *cov * turn.transpose() + of_pupil;
+  return true;
+}
+
 bool is_inside(const Camera<double>& camera, const Vector2<double>& u) {
   return u.x() >= 0 && u.x() <= camera.width && u.y() >= 0 && u.y() <= camera.height;
 }
@@ -85,11 +103,22 @@ bool is_inside(const Camera<double>& camera, const Vector2<double>& u) {
 
 bool parse_direction_query(const std::string& body, DirectionQuery* query, std::string* error) {
   Json object;
-  if (!parse_json_object(body, kDeepest, {"frame", "pixel_sigma_px", "pixels", "time_s"}, &object,
+  if (!parse_json_object(body, kDeepest,
+                         {"distance_m", "frame", "pixel_sigma_px", "pixels", "time_s"}, &object,
                          error) ||
       !parse_frame_choice(object, &query->which, error) ||
       !parse_vectors<2>(object, "pixels", &query->pixels, error))
     return false;
+  const auto distance = object.find("distance_m");
+  if (distance != object.end()) {
+    if (!distance->is_number() || !(distance->get<double>() >= kNearestScene_m) ||
+        !(distance->get<double>() <= kLargestDistance_m)) {
+      *error = fmt::format("distance_m must be a number from {} to {}, from where the axes meet",
+                           kNearestScene_m, kLargestDistance_m);
+      return false;
+    }
+    query->distance_m = distance->get<double>();
+  }
   const auto sigma = object.find("pixel_sigma_px");
   if (sigma == object.end()) return true;
   const bool good =
@@ -121,7 +150,8 @@ bool parse_pixel_query(const std::string& body, PixelQuery* query, std::string* 
 }
 
 std::string direction_answer(const OrientationRecord& record, const DirectionQuery& query,
-                             const PlaneEstimate* plane) {
+                             const PlaneEstimate* plane, const Pupil& pupil,
+                             double scene_nearness) {
   const FrameOrientation frame = unpack(record.orientation->geometry, record.camera);
   Json directions = Json::array();
   for (const Vector2<double>& u : query.pixels) {
@@ -137,6 +167,12 @@ std::string direction_answer(const OrientationRecord& record, const DirectionQue
       item["error"] = to_string(status);
     } else {
       if (query.pixel_sigma_px > 0) cov += pixel_noise(frame, u, d_b, query.pixel_sigma_px);
+      if (query.distance_m &&
+          !correct_for_distance(frame, u, pupil, scene_nearness, *query.distance_m, &d_b, &cov)) {
+        item["error"] = "nearer than the pupil";
+        directions.push_back(std::move(item));
+        continue;
+      }
       const Matrix<double, 3, 2> basis = tangent_basis(d_b);
       const double largest = Eigen::SelfAdjointEigenSolver<Matrix2<double>>()
                                  .computeDirect(cov, Eigen::EigenvaluesOnly)

@@ -209,6 +209,8 @@ void SelfCalibration::store(const CalibrationResult& result, const MapState& map
   stored.notes.excluded = result.exclusions.describe();
   stored.notes.zoom_curve = nodes_.curve();
   stored.notes.telemetry_error = result.telemetry_error;
+  stored.notes.pupil = options_.adjustment.pupil;
+  stored.notes.far_focal_length = result.far_focal_length();
   stored.map = map;
   std::string error;
   if (!archive_->save(stored, &error)) messages_.say(error + "; kept, will be tried again");

@@ -51,6 +51,9 @@ void require_sound(const Config& config) {
   FUZZ_REQUIRE(is_within(config.realtime.max_extrapolation_s, 0, 10));
   const double repeat_s = pan_tilt.max_repeat_s;
   FUZZ_REQUIRE(repeat_s == 0 || repeat_s < config.realtime.max_extrapolation_s);
+  FUZZ_REQUIRE(config.camera.pupil.place_m.cwiseAbs().maxCoeff() <= kFarthestPupil_m);
+  FUZZ_REQUIRE(!config.scene || (config.scene->nearest_m >= kNearestScene_m &&
+                                 config.scene->nearest_m < config.scene->farthest_m));
   FUZZ_REQUIRE(is_within(config.realtime.priority, 0, 99));
   FUZZ_REQUIRE(is_within(config.realtime.cpu, -1, 1023));
   FUZZ_REQUIRE(!config.tracking.targets || config.tracking.targets->validate());

@@ -30,6 +30,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     for (const Vector2<double>& u : directions.pixels) FUZZ_REQUIRE(all_finite(u));
     FUZZ_REQUIRE(directions.pixel_sigma_px >= 0 && directions.pixel_sigma_px <= 1000);
     FUZZ_REQUIRE(!directions.which.frame || !directions.which.time_s);
+    FUZZ_REQUIRE(!directions.distance_m ||
+                 (*directions.distance_m >= 1 && *directions.distance_m <= 1e9));
     require_answer(direction_answer(record_of_frame(0), directions));
   } else {
     FUZZ_REQUIRE(is_one_line(error));

@@ -29,6 +29,8 @@ function showCalibration(calibration) {
     const value = which ? which.map((i) => parameter.value[i]) : parameter.value;
     entries.push([name, withSigma(value, parameter.sigma, scale, unit)]);
   }
+  if (isNumber(calibration.holds_beyond_m))
+    entries.push(['Holds for things farther than', `${Number(calibration.holds_beyond_m.toPrecision(2))} m`]);
   if (isNumber(calibration.zoom)) entries.push(['Zoom', String(calibration.zoom)]);
   rows('calibration', entries);
   showZoomCurve(calibration.zoom_curve ?? null);

@@ -149,6 +149,42 @@ TEST(CalibrationText, AcceptsQualityAndLandmarks) {
 }
 
 // Of a centre that is the image's middle exactly nothing is written: as before there were others.
+TEST(CalibrationText, TellsForWhichDistancesItHolds) {
+  Calibration calibration = paper_calibration();
+  const int f = index(Parameter::kFocalLength);
+  calibration.covariance(f, f) = std::pow(1e-3 * calibration.camera.focal_length, 2);
+  CalibrationNotes notes;
+  const std::string usual = format_calibration(calibration, notes);
+  EXPECT_THAT(usual, HasSubstr("holds_beyond_m: 50 "));
+  EXPECT_THAT(usual, Not(HasSubstr("pupil_m")));
+  EXPECT_THAT(usual, Not(HasSubstr("far_focal_length")));
+  notes.pupil.place_m = {0.01, -0.02, 0.075};
+  notes.pupil.sigma_m.setConstant(0.005);
+  notes.far_focal_length = CalibrationPrior{31990.5, 12};
+  const std::string text = format_calibration(calibration, notes);
+  EXPECT_THAT(text,
+              HasSubstr("pupil_m: {value: [0.01, -0.02, 0.075], sigma: [0.005, 0.005, 0.005]}"));
+  EXPECT_THAT(text, HasSubstr("far_focal_length: {value: 31990.5, sigma: 12}"));
+  EXPECT_THAT(text, HasSubstr("holds_beyond_m: 80 "));
+  expect_same_bits(parsed(text), calibration);
+}
+
+TEST(CalibrationText, RefusesDistancesThatAreNone) {
+  const auto refused = [](const std::string& line) {
+    return refusal(std::string(kByHand) + line + "\n");
+  };
+  EXPECT_EQ(refused("pupil_m: {value: [0, 0, 5], sigma: [0, 0, 0]}"),
+            "test.yaml:12: pupil_m.value has 5; give metres, at most 1");
+  EXPECT_THAT(refused("pupil_m: {value: [0, 0, 0.05]}"), HasSubstr("pupil_m.sigma is missing"));
+  EXPECT_THAT(refused("pupil_m: 5"), StartsWith("test.yaml:12: pupil_m"));
+  EXPECT_EQ(refused("holds_beyond_m: 0"),
+            "test.yaml:12: holds_beyond_m is not more than 0; give metres");
+  EXPECT_THAT(refused("far_focal_length: {value: -2, sigma: 1}"),
+              HasSubstr("far_focal_length is -2; give pixels"));
+  EXPECT_THAT(refused("far_focal_length: {value: 32000, sigma: -1}"),
+              HasSubstr("far_focal_length.sigma is less than 0; give px"));
+}
+
 TEST(CalibrationText, TellsOfTheOpticalCentreWhereItIsNotTheMiddle) {
   const std::string with = format_calibration(paper_calibration());
   EXPECT_THAT(with, HasSubstr("centre_offset: {value: [-7.1, 0.3333333333333333], sigma: ["));

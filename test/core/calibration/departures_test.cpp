@@ -272,11 +272,7 @@ TEST(Departures, AreDescribedInWords) {
   EXPECT_EQ(lines[2], "beside it: optical centre, 11 px; the sigmas have what it does");
   quality.causes = {{"different distances", 270, 2, 1.25, "per mille of the focal length"}};
   const auto of_depth = quality.describe_departures();
-  ASSERT_EQ(of_depth.size(), 3u);
-  EXPECT_EQ(
-      of_depth[2],
-      "the focal length's sigma covers things farther than 10 m, if the lens's pupil lies 5 cm "
-      "before or behind the axes");
+  EXPECT_EQ(of_depth.size(), 2u);
 }
 
 }  // namespace

@@ -213,6 +213,10 @@ TEST(CommandLine, NamesWhatWasMistypedAndWhatIsNearest) {
                 "--help"},
            Slip{{"calibrate", "x", "--angle-accuracy", "6"},
                 "'6' is not a number of degrees from 0 to 5; see"},
+           Slip{{"calibrate", "x", "--pupil", "0,0,5"},
+                "'5' is not a number of metres from -1 to 1; see"},
+           Slip{{"calibrate", "x", "--scene-distance", "0.5,20"},
+                "'0.5' is not a number of metres, 1 or more; see"},
            Slip{{"calibrate", "x", "--scale-sigma", "2"}, "'2' is not a number from 0 to 1; see"},
        }) {
     const Result result = alidade(arguments);

@@ -259,7 +259,9 @@ TEST_F(ConfigTest, EveryKeyIsRead) {
           "           password_env: ALIDADE_TEST_PASSWORD, timeout_s: 0.5, max_backoff_s: 9,\n"
           "           angle_sigma_rad: 2e-5, angle_quantum_rad: 1e-4, angle_accuracy_deg: 0.05}\n"
           "camera: {focal_length_px: 30000, aspect: 1.01, radial_distortion: -2.5,\n"
-          "         centre_sigma_px: 2, line_delay_s: 1.5e-5, upside_down: true, zoom: fixed}\n"
+          "         centre_sigma_px: 2, line_delay_s: 1.5e-5, upside_down: true, zoom: fixed,\n"
+          "         pupil_m: [0.01, -0.02, 0.06]}\n"
+          "scene: {nearest_m: 20, farthest_m: 400}\n"
           "calibration: {file: /etc/c.yaml, prior: bench/lens.yaml, auto: false, zoom_tolerance: "
           "2.5, clock_offset_sigma_ms: 20}\n"
           "realtime: {mode: PT, priority: 60, cpu: 3, lock_memory: true, max_extrapolation_s: "
@@ -299,6 +301,11 @@ TEST_F(ConfigTest, EveryKeyIsRead) {
   EXPECT_EQ(config_.camera.centre_sigma_px, 2);
   EXPECT_EQ(config_.camera.line_delay_s, 1.5e-5);
   EXPECT_TRUE(config_.camera.upside_down);
+  EXPECT_EQ(config_.camera.pupil.place_m, Vector3<double>(0.01, -0.02, 0.06));
+  EXPECT_EQ(config_.camera.pupil.sigma_m.maxCoeff(), kStatedPupilSigma_m);
+  ASSERT_TRUE(config_.scene);
+  EXPECT_EQ(config_.scene->nearest_m, 20);
+  EXPECT_EQ(config_.scene->farthest_m, 400);
   EXPECT_EQ(config_.calibration.file, "/etc/c.yaml");
   EXPECT_EQ(config_.calibration.prior, directory_.path() + "/bench/lens.yaml");
   EXPECT_FALSE(config_.calibration.automatic);
@@ -733,6 +740,7 @@ TEST_F(ConfigTest, TheExamplesShowEveryKey) {
       {"pan_tilt", "{type: visca, url: 'udp://c:1', " + head + steps + ", zzz: 1}"},
       {"pan_tilt", "{type: ptu, url: 'tcp://c:1', " + head + ", zzz: 1}"},
       {"camera", "{zzz: 1}"},
+      {"scene", "{zzz: 1}"},
       {"calibration", "{zzz: 1}"},
       {"realtime", "{zzz: 1}"},
       {"scene_map", "{zzz: 1}"},
@@ -1081,6 +1089,15 @@ INSTANTIATE_TEST_SUITE_P(
                 "unknown key"},
         Mistake{"NumberWithUnit", VIDEO "pan_tilt: {type: vapix, url: http://c, rate_hz: 30 Hz}\n",
                 ":2: pan_tilt.rate_hz", "'30 Hz' is not a plain number from 0.1 to 1000 (Hz)"},
+        Mistake{"PupilInCentimetres",
+                MINIMAL "camera: {focal_length_px: 1000, pupil_m: [0, 0, 5]}\n",
+                ":4: camera.pupil_m", "from -1 to 1 (m)"},
+        Mistake{"SceneNearerThanAMetre", MINIMAL CAMERA "scene: {nearest_m: 0.5}\n",
+                ":5: scene.nearest_m", "from 1 to 1000000000 (m)"},
+        Mistake{"SceneTheWrongWayRound", MINIMAL CAMERA "scene: {nearest_m: 50, farthest_m: 20}\n",
+                ":5: scene.farthest_m", "farthest_m is the larger of the two"},
+        Mistake{"SceneWithoutNearest", MINIMAL CAMERA "scene: {farthest_m: 20}\n",
+                ":5: scene.nearest_m", "give how near the nearest thing in view is"},
         Mistake{"NumberIsText", MINIMAL "camera: {focal_length_px: long}\n",
                 ":4: camera.focal_length_px", "'long' is not a plain number"},
         Mistake{"NumberIsQuoted", MINIMAL "camera: {focal_length_px: '30000'}\n",

@@ -159,6 +159,17 @@ TEST(CalibrationReport, DrawsWhatTelemetryIsOffBy) {
   EXPECT_EQ(count(run.report(), "<svg"), count(without, "<svg"));
 }
 
+TEST(CalibrationReport, SaysForWhichDistancesItHolds) {
+  Calibrated run{test::Simulation()};
+  EXPECT_THAT(run.report(), HasSubstr("Holds for things farther than "));
+  EXPECT_THAT(run.report(), Not(HasSubstr("Focal length of far things")));
+  run.options.pupil.place_m.z() = 0.07;
+  run.result.nearness = Nearness{1e-3, 2e-4};
+  const std::string page = run.report();
+  EXPECT_THAT(page, HasSubstr("a lens's pupil 12 cm before or behind the axes"));
+  EXPECT_THAT(page, HasSubstr("Focal length of far things, as scene and pupil tell: "));
+}
+
 TEST(CalibrationReport, LoadsNothingAndRunsNothing) {
   const std::string page = Calibrated{test::Simulation()}.report();
   for (const char* part :

@@ -293,6 +293,23 @@ TEST_F(HttpApiWithSceneMapTest, TellsWhatLocalizationHasDone) {
   EXPECT_THAT(metrics, HasSubstr("\nalidade_scene_map_movements_total 1\n"));
 }
 
+TEST_F(HttpApiTest, TellsForWhichDistancesTheCalibrationHolds) {
+  Calibration calibration = test::zoom_curve().node(0);
+  const int f = index(Parameter::kFocalLength);
+  calibration.covariance(f, f) = std::pow(2e-4 * calibration.camera.focal_length, 2);
+  OrientationRecord record = record_without_orientation(1);
+  record.calibrated = true;
+  record.camera = pack(calibration);
+  ASSERT_TRUE(live_.write(record));
+  // The usual pupil, 5 cm.
+  EXPECT_NEAR(body_of(get("/api/v1/calibration"))["holds_beyond_m"].get<double>(), 250, 1e-3);
+  calibration.covariance.setZero();
+  record.frame = 2;
+  record.camera = pack(calibration);
+  ASSERT_TRUE(live_.write(record));
+  EXPECT_FALSE(body_of(get("/api/v1/calibration")).contains("holds_beyond_m"));
+}
+
 TEST_F(HttpApiTest, TellsTheZoomCurveWithTheCalibration) {
   OrientationRecord record = record_without_orientation(1);
   record.calibrated = true;

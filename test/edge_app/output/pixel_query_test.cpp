@@ -131,6 +131,49 @@ TEST(DirectionQuery, WithAPlaneADirectionHasItsPlaceOnIt) {
   EXPECT_EQ(directions_on(estimate, body)["directions"][1]["plane"]["error"], "above the horizon");
 }
 
+TEST(DirectionQuery, OfAThingAtAKnownDistanceIsToldFromTheAxes) {
+  const std::string pixels = R"({"pixels": [[100, 600], [640, 360]])";
+  const json far = directions_of(pixels + "}")["directions"];
+  const json near = directions_of(pixels + R"(, "distance_m": 10})")["directions"];
+  Pupil pupil;
+  pupil.place_m = {0.03, 0.02, 0.06};
+  pupil.sigma_m.setZero();
+  const json stated = json::parse(direction_answer(
+      record(), direction_query(pixels + R"(, "distance_m": 10})"), nullptr, pupil))["directions"];
+  for (std::size_t i = 0; i < far.size(); ++i) {
+    const Vector3<double> seen = vector_of<3>(far[i]["direction"]);
+    // The usual pupil is in the middle, and uncertain.
+    EXPECT_LT((vector_of<3>(near[i]["direction"]) - seen).norm(), 1e-12);
+    EXPECT_NEAR(matrix_of(near[i]["covariance"]).trace(),
+                matrix_of(far[i]["covariance"]).trace() + 2 * std::pow(0.05 / 10, 2), 1e-9);
+    // A stated one is not: pixel i looks along t = (r d - R o), R near that of row 0.
+    const Vector3<double> place = 10 * vector_of<3>(stated[i]["direction"]);
+    const Vector3<double> from_pupil = place - frame().R_base_from_camera * pupil.place_m;
+    EXPECT_LT((from_pupil.normalized() - seen).norm(), 1e-3 * 0.07 / 10 * 50);
+    EXPECT_GT((vector_of<3>(stated[i]["direction"]) - seen).norm(), 0.5 * 0.03 / 10);
+  }
+}
+
+// A calibration of the scene already has what the pupil does at the scene's distance.
+TEST(DirectionQuery, OfAThingAtTheScenesDistanceStaysWhereTheSceneIs) {
+  const std::string body = R"({"pixels": [[100, 600], [1200, 90]], "distance_m": 30})";
+  Pupil pupil;
+  pupil.place_m = {0, 0, 0.06};
+  const json far = directions_of(R"({"pixels": [[100, 600], [1200, 90]]})")["directions"];
+  const auto at = [&](double nearness) {
+    return json::parse(
+        direction_answer(record(), direction_query(body), nullptr, pupil, nearness))["directions"];
+  };
+  const json of_scene = at(0.06 / 30);
+  const json of_far_things = at(0);
+  for (std::size_t i = 0; i < far.size(); ++i) {
+    const Vector3<double> plain = vector_of<3>(far[i]["direction"]);
+    const double moved = (vector_of<3>(of_far_things[i]["direction"]) - plain).norm();
+    EXPECT_GT(moved, 1e-6);
+    EXPECT_LT((vector_of<3>(of_scene[i]["direction"]) - plain).norm(), 0.05 * moved);
+  }
+}
+
 TEST(FrameGeometry, PackedAndUnpackedIsTheSame) {
   const FrameOrientation before = frame();
   const FrameOrientation after = unpack(pack(before), pack(before.calibration));
@@ -398,6 +441,8 @@ INSTANTIATE_TEST_SUITE_P(
         Refused{"TextFrame", R"({"frame":"1","pixels":[[1,2]]})", "frame must be an integer"},
         Refused{"TextTime", R"({"time_s":"1","pixels":[[1,2]]})", "time_s must be a number"},
         Refused{"NegativeSigma", R"({"pixels":[[1,2]],"pixel_sigma_px":-1})", "from 0 to 1000"},
+        Refused{"NearDistance", R"({"pixels":[[1,2]],"distance_m":0.5})", "from 1 to"},
+        Refused{"TextDistance", R"({"pixels":[[1,2]],"distance_m":"far"})", "from 1 to"},
         Refused{"HugeSigma", R"({"pixels":[[1,2]],"pixel_sigma_px":1001})", "from 0 to 1000"}),
     [](const ::testing::TestParamInfo<Refused>& one) { return one.param.name; });
 
