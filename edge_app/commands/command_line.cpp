@@ -142,6 +142,9 @@ void add_verify(CLI::App& app, int* exit_code) {
   command->add_option("recording", options->recording, "Directory of the recording")->required();
   command->add_option("--calibration", options->calibration,
                       "Calibration (default: DIR/alidade/calibration.yaml)");
+  command->add_option("--known", options->known,
+                      "Directions known from outside: a table of frame,u_px,v_px,azimuth_deg,"
+                      "elevation_deg,sigma_deg");
   command->add_option("-o,--output", options->directory,
                       "Directory for verification.html (default: DIR/alidade)");
   add_zoom_tolerance(command, &options->zoom_tolerance);

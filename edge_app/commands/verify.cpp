@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <ctime>
 #include <string>
@@ -30,6 +31,7 @@ namespace {
 
 struct VerifiedReplay {
   std::vector<SeenFrame> frames;
+  std::vector<KnownSight> known;
   int samples = 0;
   double telemetry_s = 0;  // from the first sample to the last
 };
@@ -44,10 +46,42 @@ std::vector<PanTiltSample> all_samples(const std::string& recording) {
   return out;
 }
 
+std::vector<KnownDirection> known_directions(const VerifyOptions& options,
+                                             const Camera<double>& camera,
+                                             const std::vector<FrameStamp>& stamps) {
+  std::vector<KnownDirection> known;
+  if (options.known.empty()) return known;
+  std::string error;
+  if (!read_known_directions(options.known, camera.width, camera.height, &known, &error))
+    throw CommandError(kExitUsage, error);
+  for (const KnownDirection& each : known) {
+    const bool is_there =
+        std::any_of(stamps.begin(), stamps.end(),
+                    [&each](const FrameStamp& stamp) { return stamp.frame == each.frame; });
+    if (is_there) continue;
+    throw CommandError(
+        kExitUsage,
+        fmt::format("{}: frame {} is not in the recording {}{}", options.known, each.frame,
+                    options.recording,
+                    stamps.empty() ? ""
+                                   : fmt::format(", which has frames {} to {}",
+                                                 stamps.front().frame, stamps.back().frame)));
+  }
+  return known;
+}
+
+FrameOrientation orientation_in(const OrientationRecord& record, RecordMode mode) {
+  return record.mode == mode && record.orientation && record.calibrated
+             ? unpack(record.orientation->geometry, record.camera)
+             : FrameOrientation{};
+}
+
 VerifiedReplay replay_both_modes(const VerifyOptions& options, OrientationStepOptions of_step) {
   std::string error;
   std::vector<FrameStamp> stamps;
   if (!read_frames_csv(options.recording, &stamps, &error)) throw CommandError(kExitUsage, error);
+  const std::vector<KnownDirection> known =
+      known_directions(options, of_step.calibration.camera, stamps);
   OrientationStep by_telemetry(of_step);
   OrientationStep by_all_samples(of_step);
   of_step.oe = oe_options(of_step.calibration.camera);
@@ -87,6 +121,11 @@ VerifiedReplay replay_both_modes(const VerifyOptions& options, OrientationStepOp
     const OrientationRecord of_all_samples =
         by_all_samples.add_frame(frame->stamp, ImageView{}, &events);
     collection.add(of_landmarks, of_telemetry, of_all_samples, view_of(image));
+    for (const KnownDirection& each : known) {
+      if (each.frame != frame->stamp.frame) continue;
+      out.known.push_back({each, orientation_in(of_telemetry, RecordMode::kPt),
+                           orientation_in(of_landmarks, RecordMode::kOe)});
+    }
     by_telemetry.maintain();
     by_all_samples.maintain();
     by_landmarks.maintain();
@@ -119,7 +158,8 @@ Verification judge_recording(const VerifyOptions& options) {
   const VerifiedReplay replay = replay_both_modes(options, of_step);
   return verify({options.recording, calibration.name, replay.frames, calibration.telemetry_error,
                  of_step.telemetry_noise.pan_tilt_sigma,
-                 replay.telemetry_s > 0 ? (replay.samples - 1) / replay.telemetry_s : 0});
+                 replay.telemetry_s > 0 ? (replay.samples - 1) / replay.telemetry_s : 0,
+                 replay.known});
 }
 
 int exit_code_of(Verdict verdict) {

@@ -9,6 +9,7 @@ namespace alidade {
 struct VerifyOptions {
   std::string recording;
   std::string calibration;  // empty: <recording>/alidade/calibration.yaml
+  std::string known;        // DIRECTIONS.csv (docs/commands.md); empty: none
   std::string directory;    // for verification.html; empty: <recording>/alidade
   // Device units; readings that differ by no more are one zoom. Empty: found from their jitter.
   std::optional<double> zoom_tolerance;

@@ -172,6 +172,29 @@ std::vector<std::string> advice_for(const VerifyInput& input, const Verification
   return out;
 }
 
+void judge_known(const VerifyInput& input, double log_limit, Verification* out) {
+  const FrameOrientation& any = input.known.front().by_telemetry;
+  for (const OrientationFrom from : {OrientationFrom::kLandmarks, OrientationFrom::kTelemetry}) {
+    KnownComparison comparison;
+    comparison.from = from;
+    comparison.result = check_known(input.known, from, any.calibration.covariance);
+    const KnownResult& result = comparison.result;
+    const bool is_contradicted = result.numbers > 0 && result.log_chance < log_limit;
+    if (is_contradicted) {
+      comparison.verdict = Verdict::kContradicted;
+    } else if (result.share >= kLeastShare) {
+      comparison.verdict = Verdict::kHolds;
+    }
+    comparison.turn_explains =
+        is_contradicted && result.has_turn && result.log_chance_turned >= log_limit;
+    comparison.sentence = sentence_of(comparison);
+    if (is_contradicted) out->verdict = Verdict::kContradicted;
+    if (comparison.verdict == Verdict::kHolds && out->verdict == Verdict::kNotJudged)
+      out->verdict = Verdict::kHolds;
+    out->known.push_back(std::move(comparison));
+  }
+}
+
 }  // namespace
 
 Verification verify(const VerifyInput& input) {
@@ -183,7 +206,8 @@ Verification verify(const VerifyInput& input) {
   out.by_all_samples = pair_rows(frames, pairs, OrientationFrom::kAllSamples);
   out.pairs = static_cast<int>(out.by_telemetry.size());
   constexpr int kKinds = static_cast<int>(ReturnKind::kCount);
-  out.chance_limit = kFalseAlarms / (2 * kKinds + kDepartureCount);
+  const int of_known = input.known.empty() ? 0 : 2;
+  out.chance_limit = kFalseAlarms / (2 * kKinds + kDepartureCount + of_known);
   const double log_limit = std::log(out.chance_limit);
   if (!out.by_telemetry.empty()) {
     std::size_t reference = 0;
@@ -231,6 +255,7 @@ Verification verify(const VerifyInput& input) {
     if (comparison.verdict == Verdict::kContradicted) out.verdict = Verdict::kContradicted;
   }
   if (!is_enough) out.found.clear();
+  if (!input.known.empty()) judge_known(input, log_limit, &out);
   out.advice = advice_for(input, out);
   out.sentence = summary_of(out);
   return out;

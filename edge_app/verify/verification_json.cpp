@@ -3,6 +3,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "core/model/angle.h"
 #include "edge_app/verify/verification_words.h"
 
 namespace alidade {
@@ -44,6 +45,30 @@ ordered_json to_json(const DepartureTest& test) {
   return json;
 }
 
+ordered_json to_json(const KnownComparison& comparison) {
+  constexpr double kDegrees = 180 / kPi;
+  const KnownResult& r = comparison.result;
+  ordered_json json;
+  json["mode"] = comparison.from == OrientationFrom::kLandmarks ? "OE" : "PT";
+  json["verdict"] = to_string(comparison.verdict);
+  json["directions"] = r.offsets.size();
+  json["independent_numbers"] = r.freedom;
+  json["rms_deg"] = kDegrees * r.rms;
+  json["ratio"] = r.ratio;
+  json["chance"] = std::exp(r.log_chance);
+  json["camera_share"] = r.share;
+  if (r.has_turn) {
+    for (int i = 0; i < 3; ++i) {
+      json["turn_deg"].push_back(kDegrees * r.turn[i]);
+      json["turn_sigma_deg"].push_back(kDegrees * r.turn_sigma[i]);
+    }
+    json["ratio_turned"] = r.ratio_turned;
+    json["turn_explains"] = comparison.turn_explains;
+  }
+  json["sentence"] = comparison.sentence;
+  return json;
+}
+
 }  // namespace
 
 std::string verification_json(const Verification& verification,
@@ -66,6 +91,8 @@ std::string verification_json(const Verification& verification,
     each["sentence"] = comparison.sentence;
     json["model"].push_back(std::move(each));
   }
+  json["known"] = ordered_json::array();
+  for (const KnownComparison& known : verification.known) json["known"].push_back(to_json(known));
   json["causes"] = ordered_json::array();
   for (const DepartureTest& found : verification.found) json["causes"].push_back(to_json(found));
   for (const auto& [kind, path] : files) json["files"][kind] = path;

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/model/angle.h"
+
 namespace alidade {
 namespace {
 
@@ -18,6 +20,16 @@ double largest_sigmas(const DepartureTest& test) {
     if (test.sigma[i] > 0) out = std::max(out, std::abs(test.size[i]) / test.sigma[i]);
   }
   return out;
+}
+
+// The comparison with what is known from outside that decides; null: none.
+const KnownComparison* worst_known(const Verification& verification) {
+  const KnownComparison* worst = nullptr;
+  for (const KnownComparison& each : verification.known) {
+    if (each.verdict == Verdict::kNotJudged) continue;
+    if (worst == nullptr || each.result.log_chance < worst->result.log_chance) worst = &each;
+  }
+  return worst;
 }
 
 const ClaimComparison* worst_claim(const Verification& verification) {
@@ -186,7 +198,31 @@ std::string sentence_of(const ModelComparison& comparison) {
   return name;
 }
 
+std::string sentence_of(const KnownComparison& comparison) {
+  constexpr double kDegrees = 180 / kPi;
+  const KnownResult& r = comparison.result;
+  std::string out = fmt::format("known directions, {}: ", mode_of(comparison.from));
+  if (r.numbers == 0) return out + "not judged; none of their frames has an orientation";
+  if (comparison.verdict == Verdict::kNotJudged) {
+    return out + fmt::format("not judged; their stated sigma is {:.0f} % of the variance",
+                             100 * (1 - r.share));
+  }
+  out += fmt::format("{} are off by {:.2f} times what the sigmas claim (RMS {:.2g} deg)",
+                     r.offsets.size(), r.ratio, kDegrees * r.rms);
+  if (comparison.verdict == Verdict::kContradicted) out += ", more than chance";
+  if (comparison.turn_explains) {
+    const Vector3<double> turn = kDegrees * r.turn;
+    const Vector3<double> sigma = kDegrees * r.turn_sigma;
+    out += fmt::format(
+        ". All agree once directions are turned by roll {:.3g} +- {:.2g}, pitch {:.3g} +- {:.2g}, "
+        "yaw {:.3g} +- {:.2g} deg: is the platform where the survey has it, and the head's zero?",
+        turn[0], sigma[0], turn[1], sigma[1], turn[2], sigma[2]);
+  }
+  return out;
+}
+
 std::string summary_of(const Verification& v) {
+  const KnownComparison* known = worst_known(v);
   const ClaimComparison* worst = worst_claim(v);
   const std::string differ =
       worst == nullptr
@@ -203,14 +239,21 @@ std::string summary_of(const Verification& v) {
           "needed)",
           v.pairs, kLeastPairs);
     case Verdict::kHolds:
-      return "sigmas hold: " + differ;
+      return "sigmas hold: " + differ + (!differ.empty() && known != nullptr ? "; " : "") +
+             (known != nullptr ? known->sentence : "");
     case Verdict::kContradicted:
       break;
   }
   std::string out = "contradicted: ";
+  const bool by_known = known != nullptr && known->verdict == Verdict::kContradicted;
+  if (by_known) out += known->sentence;
+  const bool by_recording =
+      !v.found.empty() || (worst != nullptr && worst->verdict == Verdict::kContradicted);
+  if (by_known && !by_recording) return out;
+  if (by_known) out += "; ";
   if (worst != nullptr && worst->verdict == Verdict::kContradicted) out += differ;
   for (std::size_t i = 0; i < v.found.size(); ++i) {
-    if (i == 0 && out.size() > 14) out += "; ";
+    if (i == 0 && worst != nullptr && worst->verdict == Verdict::kContradicted) out += "; ";
     out += (i == 0 ? "likeliest cause: " : ", then: ");
     out += fmt::format("{} ({})", name_of(v.found[i].departure), size_of(v.found[i]));
   }
@@ -224,6 +267,8 @@ std::string verification_text(const Verification& verification) {
     if (comparison.result.pairs > 0) out += fmt::format("  {}\n", comparison.sentence);
   }
   for (const ModelComparison& comparison : verification.model)
+    out += fmt::format("  {}\n", comparison.sentence);
+  for (const KnownComparison& comparison : verification.known)
     out += fmt::format("  {}\n", comparison.sentence);
   for (const std::string& advice : verification.advice) out += fmt::format("advice: {}\n", advice);
   return out;
