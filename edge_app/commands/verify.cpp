@@ -14,6 +14,8 @@
 #include <string>
 #include <vector>
 
+#include "core/calibration/number_text.h"
+#include "core/model/angle.h"
 #include "edge_app/clocks/fresh_beginning.h"
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/output_directory.h"
@@ -51,23 +53,19 @@ std::vector<KnownDirection> known_directions(const VerifyOptions& options,
                                              const std::vector<FrameStamp>& stamps) {
   std::vector<KnownDirection> known;
   if (options.known.empty()) return known;
+  KnownLimits limits{camera.width, camera.height, {}};
+  for (const FrameStamp& stamp : stamps) limits.frames.push_back(stamp.frame);
+  std::sort(limits.frames.begin(), limits.frames.end());
   std::string error;
-  if (!read_known_directions(options.known, camera.width, camera.height, &known, &error))
+  if (!read_known_directions(options.known, limits, &known, &error))
     throw CommandError(kExitUsage, error);
-  for (const KnownDirection& each : known) {
-    const bool is_there =
-        std::any_of(stamps.begin(), stamps.end(),
-                    [&each](const FrameStamp& stamp) { return stamp.frame == each.frame; });
-    if (is_there) continue;
-    throw CommandError(
-        kExitUsage,
-        fmt::format("{}: frame {} is not in the recording {}{}", options.known, each.frame,
-                    options.recording,
-                    stamps.empty() ? ""
-                                   : fmt::format(", which has frames {} to {}",
-                                                 stamps.front().frame, stamps.back().frame)));
-  }
   return known;
+}
+
+// text: degrees, "free" or empty, as the command line has checked it.
+double turn_sigma_of(const std::string& text) {
+  if (text == "free") return TurnSigma::kFree;
+  return number_of(text).value_or(0) * kPi / 180;
 }
 
 FrameOrientation orientation_in(const OrientationRecord& record, RecordMode mode) {
@@ -156,10 +154,14 @@ Verification judge_recording(const VerifyOptions& options) {
   of_step.zoom_tolerance = options.zoom_tolerance;
   of_step.wait_for_pace = !noise.image_stamp_sigma_s;
   const VerifiedReplay replay = replay_both_modes(options, of_step);
-  return verify({options.recording, calibration.name, replay.frames, calibration.telemetry_error,
+  return verify({options.recording,
+                 calibration.name,
+                 replay.frames,
+                 calibration.telemetry_error,
                  of_step.telemetry_noise.pan_tilt_sigma,
                  replay.telemetry_s > 0 ? (replay.samples - 1) / replay.telemetry_s : 0,
-                 replay.known});
+                 replay.known,
+                 {turn_sigma_of(options.heading_sigma), turn_sigma_of(options.level_sigma)}});
 }
 
 int exit_code_of(Verdict verdict) {

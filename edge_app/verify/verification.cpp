@@ -172,25 +172,35 @@ std::vector<std::string> advice_for(const VerifyInput& input, const Verification
   return out;
 }
 
+// The turn of the platform that the known directions would agree with.
+std::optional<KnownResult> turn_that_agrees(const VerifyInput& input, OrientationFrom from,
+                                            double log_limit) {
+  const TurnSigma& stated = input.turn_sigma;
+  for (const TurnSigma& tried :
+       {TurnSigma{TurnSigma::kFree, stated.level}, TurnSigma{TurnSigma::kFree, TurnSigma::kFree}}) {
+    if (tried.heading == stated.heading && tried.level == stated.level) continue;
+    KnownResult result = check_known(input.known, from, tried);
+    const bool is_new = !result.turn_sigma.isZero();
+    if (result.is_determined && is_new && result.log_chance >= log_limit) return result;
+  }
+  return std::nullopt;
+}
+
 void judge_known(const VerifyInput& input, double log_limit, Verification* out) {
-  const FrameOrientation& any = input.known.front().by_telemetry;
   for (const OrientationFrom from : {OrientationFrom::kLandmarks, OrientationFrom::kTelemetry}) {
     KnownComparison comparison;
     comparison.from = from;
-    comparison.result = check_known(input.known, from, any.calibration.covariance);
+    comparison.result = check_known(input.known, from, input.turn_sigma);
     const KnownResult& result = comparison.result;
-    const bool is_contradicted = result.numbers > 0 && result.log_chance < log_limit;
-    if (is_contradicted) {
+    if (result.is_determined && result.log_chance < log_limit) {
       comparison.verdict = Verdict::kContradicted;
-    } else if (result.share >= kLeastShare) {
+      comparison.turned = turn_that_agrees(input, from, log_limit);
+      out->verdict = Verdict::kContradicted;
+    } else if (result.is_determined && result.share >= kLeastShare) {
       comparison.verdict = Verdict::kHolds;
+      if (out->verdict == Verdict::kNotJudged) out->verdict = Verdict::kHolds;
     }
-    comparison.turn_explains =
-        is_contradicted && result.has_turn && result.log_chance_turned >= log_limit;
     comparison.sentence = sentence_of(comparison);
-    if (is_contradicted) out->verdict = Verdict::kContradicted;
-    if (comparison.verdict == Verdict::kHolds && out->verdict == Verdict::kNotJudged)
-      out->verdict = Verdict::kHolds;
     out->known.push_back(std::move(comparison));
   }
 }

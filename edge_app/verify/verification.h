@@ -54,8 +54,9 @@ struct ModelComparison {
 struct KnownComparison {
   OrientationFrom from = OrientationFrom::kLandmarks;
   Verdict verdict = Verdict::kNotJudged;
-  bool turn_explains = false;  // contradicted, but for a common turn of all directions
   KnownResult result;
+  // Contradicted, but not once the platform's turn is estimated: by the heading alone, or in all.
+  std::optional<KnownResult> turned;
   std::string sentence;  // the verdict in words
 };
 
@@ -66,7 +67,8 @@ struct VerifyInput {
   TelemetryError telemetry_error;        // of the calibration
   double telemetry_sigma_rad = 0;        // white noise of a sample, as was assumed; 0: not known
   double telemetry_rate_hz = 0;          // samples per second
-  std::vector<KnownSight> known = {};     // empty: nothing is known from outside
+  std::vector<KnownSight> known = {};    // empty: nothing is known from outside
+  TurnSigma turn_sigma = {};             // of the platform against the known directions' axes
 };
 
 struct Verification {

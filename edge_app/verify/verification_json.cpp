@@ -11,6 +11,8 @@ namespace {
 
 using nlohmann::ordered_json;
 
+constexpr double kDegrees = 180 / kPi;
+
 ordered_json to_json(const ClaimComparison& comparison) {
   const ClaimResult& r = comparison.result;
   ordered_json json;
@@ -45,27 +47,57 @@ ordered_json to_json(const DepartureTest& test) {
   return json;
 }
 
+ordered_json to_json(const KnownOffset& offset) {
+  ordered_json json;
+  json["frame"] = offset.known.frame;
+  json["u_px"] = offset.known.pixel.x();
+  json["v_px"] = offset.known.pixel.y();
+  json["off_px"] = {offset.off_px.x(), offset.off_px.y()};
+  json["claimed_px"] = offset.claimed_px;
+  if (offset.known.azimuth) {
+    json["right_deg"] = kDegrees * offset.off.x();
+    json["right_sigma_deg"] = kDegrees * offset.sigma.x();
+  }
+  json["up_deg"] = kDegrees * offset.off.y();
+  json["up_sigma_deg"] = kDegrees * offset.sigma.y();
+  json["sigmas"] = offset.sigmas;
+  return json;
+}
+
+// Axes that are taken as stated have a sigma of 0.
+void add_turn(const KnownResult& result, ordered_json* json) {
+  (*json)["turn_deg"] = ordered_json::array();
+  (*json)["turn_sigma_deg"] = ordered_json::array();
+  for (int axis = 0; axis < 3; ++axis) {
+    (*json)["turn_deg"].push_back(kDegrees * result.turn[axis]);
+    (*json)["turn_sigma_deg"].push_back(kDegrees * result.turn_sigma[axis]);
+  }
+}
+
 ordered_json to_json(const KnownComparison& comparison) {
-  constexpr double kDegrees = 180 / kPi;
   const KnownResult& r = comparison.result;
   ordered_json json;
   json["mode"] = comparison.from == OrientationFrom::kLandmarks ? "OE" : "PT";
   json["verdict"] = to_string(comparison.verdict);
   json["directions"] = r.offsets.size();
-  json["independent_numbers"] = r.freedom;
+  json["rms_px"] = r.rms_px;
   json["rms_deg"] = kDegrees * r.rms;
-  json["ratio"] = r.ratio;
-  json["chance"] = std::exp(r.log_chance);
-  json["camera_share"] = r.share;
-  if (r.has_turn) {
-    for (int i = 0; i < 3; ++i) {
-      json["turn_deg"].push_back(kDegrees * r.turn[i]);
-      json["turn_sigma_deg"].push_back(kDegrees * r.turn_sigma[i]);
-    }
-    json["ratio_turned"] = r.ratio_turned;
-    json["turn_explains"] = comparison.turn_explains;
+  json["claimed_px"] = r.claimed_px;
+  if (r.is_determined) {
+    json["independent_numbers"] = r.freedom;
+    json["ratio"] = r.ratio;
+    json["chance"] = std::exp(r.log_chance);
+    json["camera_share"] = r.share;
+    add_turn(r, &json);
+  }
+  if (comparison.turned) {
+    json["turned"]["ratio"] = comparison.turned->ratio;
+    json["turned"]["chance"] = std::exp(comparison.turned->log_chance);
+    add_turn(*comparison.turned, &json["turned"]);
   }
   json["sentence"] = comparison.sentence;
+  json["offsets"] = ordered_json::array();
+  for (const KnownOffset& each : r.offsets) json["offsets"].push_back(to_json(each));
   return json;
 }
 

@@ -196,10 +196,9 @@ std::string known_plot(const KnownComparison& known, int axis) {
   const std::vector<KnownOffset>& offsets = known.result.offsets;
   for (const KnownOffset& each : offsets)
     reach = std::max(reach, kDegreesARadian * (std::abs(each.off[axis]) + each.sigma[axis]));
-  const char* name =
-      axis == 0 ? "azimuth, known minus seen, times cos(elevation)" : "elevation, known minus seen";
+  const char* name = axis == 0 ? "Known minus seen, to the right" : "Known minus seen, up";
   SvgPlot plot(kHalf_px, kHeight_px,
-               {0, static_cast<double>(offsets.size()) + 1, "direction, in the file's order"},
+               {0, static_cast<double>(offsets.size()) + 1, "direction, in the table's order"},
                {-1.1 * reach, 1.1 * reach, "deg"});
   plot.level(0);
   const char* colour = colour_of(known.verdict);
@@ -217,13 +216,34 @@ std::string known_plot(const KnownComparison& known, int axis) {
                      plot.svg("known directions"));
 }
 
+std::string known_table(const KnownComparison& known) {
+  std::string out =
+      "<div class=\"scroll\"><table>\n<thead><tr><th>frame</th><th>u, px</th><th>v, px</th>"
+      "<th>off, px</th><th>claimed, px</th><th>right, deg</th><th>up, deg</th><th>sigmas</th></tr>"
+      "</thead>\n<tbody>\n";
+  const auto angle = [](const KnownOffset& offset, int axis) {
+    return fmt::format("{:.5f} +- {:.5f}", kDegreesARadian * offset.off[axis],
+                       kDegreesARadian * offset.sigma[axis]);
+  };
+  for (const KnownOffset& each : known.result.offsets) {
+    out += fmt::format(
+        "<tr><td>{}</td><td>{:.2f}</td><td>{:.2f}</td><td>({:.2f}, {:.2f})</td><td>{:.2f}</td>"
+        "<td>{}</td><td>{}</td><td>{:.2f}</td></tr>\n",
+        each.known.frame, each.known.pixel.x(), each.known.pixel.y(), each.off_px.x(),
+        each.off_px.y(), each.claimed_px, each.known.azimuth ? angle(each, 0) : "horizon",
+        angle(each, 1), each.sigmas);
+  }
+  return out + "</tbody>\n</table></div>\n";
+}
+
 std::string known_part(const Verification& v) {
   if (v.known.empty()) return "";
   std::string out = "<h2>Known directions</h2>\n";
   for (const KnownComparison& known : v.known) {
     out += "<p>" + escape_html(known.sentence) + "</p>\n";
-    if (known.result.numbers == 0) continue;
-    out += "<div class=\"pair\">\n" + known_plot(known, 0) + known_plot(known, 1) + "</div>\n";
+    if (known.result.offsets.empty()) continue;
+    out += "<div class=\"pair\">\n" + known_plot(known, 0) + known_plot(known, 1) + "</div>\n" +
+           known_table(known);
   }
   return out;
 }

@@ -32,6 +32,29 @@ const KnownComparison* worst_known(const Verification& verification) {
   return worst;
 }
 
+std::string directions(std::size_t count) {
+  return fmt::format("{} direction{}", count, count == 1 ? "" : "s");
+}
+
+// The platform's turn, axis by axis, if any was estimated.
+std::string turn_of(const KnownResult& result, const char* if_none, const char* before) {
+  constexpr double kDegrees = 180 / kPi;
+  constexpr const char* kNames[] = {"roll", "pitch", "heading"};
+  std::string out;
+  for (const int axis : {2, 1, 0}) {
+    if (!(result.turn_sigma[axis] > 0)) continue;
+    out += fmt::format("{}{} {:.4f} +- {:.2g} deg", out.empty() ? before : ", ", kNames[axis],
+                       kDegrees * result.turn[axis], kDegrees * result.turn_sigma[axis]);
+  }
+  return out.empty() ? if_none : out;
+}
+
+std::string joined(const std::vector<std::string>& parts) {
+  std::string out;
+  for (const std::string& part : parts) out += (out.empty() ? "" : "; ") + part;
+  return out;
+}
+
 const ClaimComparison* worst_claim(const Verification& verification) {
   const ClaimComparison* worst = nullptr;
   for (const ClaimComparison& each : verification.claims) {
@@ -199,26 +222,35 @@ std::string sentence_of(const ModelComparison& comparison) {
 }
 
 std::string sentence_of(const KnownComparison& comparison) {
-  constexpr double kDegrees = 180 / kPi;
   const KnownResult& r = comparison.result;
   std::string out = fmt::format("known directions, {}: ", mode_of(comparison.from));
-  if (r.numbers == 0) return out + "not judged; none of their frames has an orientation";
+  if (r.offsets.empty()) return out + "not judged; none of their frames has an orientation";
+  if (!r.is_determined) {
+    return out + fmt::format(
+                     "not judged; {} do not tell how the platform is turned; give more, farther "
+                     "apart, or its --heading-sigma and --level-sigma",
+                     directions(r.offsets.size()));
+  }
+  const std::string off = fmt::format("{} off by RMS {:.3g} px, {:.2f} times what the sigmas claim",
+                                      directions(r.offsets.size()), r.rms_px, r.ratio);
+  const std::string turn = turn_of(r, "with the platform as stated", "with the platform's ");
   if (comparison.verdict == Verdict::kNotJudged) {
-    return out + fmt::format("not judged; their stated sigma is {:.0f} % of the variance",
-                             100 * (1 - r.share));
+    return out +
+           fmt::format("{}, {}; not judged, as their stated sigma is {:.0f} % of the variance", off,
+                       turn, 100 * (1 - r.share));
   }
-  out += fmt::format("{} are off by {:.2f} times what the sigmas claim (RMS {:.2g} deg)",
-                     r.offsets.size(), r.ratio, kDegrees * r.rms);
-  if (comparison.verdict == Verdict::kContradicted) out += ", more than chance";
-  if (comparison.turn_explains) {
-    const Vector3<double> turn = kDegrees * r.turn;
-    const Vector3<double> sigma = kDegrees * r.turn_sigma;
-    out += fmt::format(
-        ". All agree once directions are turned by roll {:.3g} +- {:.2g}, pitch {:.3g} +- {:.2g}, "
-        "yaw {:.3g} +- {:.2g} deg: is the platform where the survey has it, and the head's zero?",
-        turn[0], sigma[0], turn[1], sigma[1], turn[2], sigma[2]);
+  if (comparison.verdict == Verdict::kHolds) return out + off + ", " + turn;
+  out += off + ", more than chance, " + turn;
+  if (comparison.turned) {
+    return out + turn_of(*comparison.turned, "", "; they agree with the platform's ") +
+           ": is the platform where the survey has it, and the head's zero?";
   }
-  return out;
+  const auto worst = std::max_element(
+      r.offsets.begin(), r.offsets.end(),
+      [](const KnownOffset& a, const KnownOffset& b) { return a.sigmas < b.sigmas; });
+  return out + fmt::format("; worst is that of frame {} at ({:g}, {:g}), by {:.3g} sigmas",
+                           worst->known.frame, worst->known.pixel.x(), worst->known.pixel.y(),
+                           worst->sigmas);
 }
 
 std::string summary_of(const Verification& v) {
@@ -232,33 +264,33 @@ std::string summary_of(const Verification& v) {
                 "sigma claims (limit {:.2f}; {}, {})",
                 worst->result.ratio, worst->result.ratio / std::max(1e-9, worst->result.low),
                 name_of(worst->kind), mode_of(worst->from));
+  std::vector<std::string> parts;
   switch (v.verdict) {
     case Verdict::kNotJudged:
-      return fmt::format(
-          "not judged: {} pairs of pictures show the same places again ({} are "
-          "needed)",
-          v.pairs, kLeastPairs);
+      parts.push_back(fmt::format("{} pairs of pictures show the same places again ({} are needed)",
+                                  v.pairs, kLeastPairs));
+      if (!v.known.empty()) parts.push_back(v.known.front().sentence);
+      return "not judged: " + joined(parts);
     case Verdict::kHolds:
-      return "sigmas hold: " + differ + (!differ.empty() && known != nullptr ? "; " : "") +
-             (known != nullptr ? known->sentence : "");
+      if (!differ.empty()) parts.push_back(differ);
+      if (known != nullptr) parts.push_back(known->sentence);
+      return "sigmas hold: " + joined(parts);
     case Verdict::kContradicted:
       break;
   }
-  std::string out = "contradicted: ";
   const bool by_known = known != nullptr && known->verdict == Verdict::kContradicted;
-  if (by_known) out += known->sentence;
-  const bool by_recording =
-      !v.found.empty() || (worst != nullptr && worst->verdict == Verdict::kContradicted);
-  if (by_known && !by_recording) return out;
-  if (by_known) out += "; ";
-  if (worst != nullptr && worst->verdict == Verdict::kContradicted) out += differ;
-  for (std::size_t i = 0; i < v.found.size(); ++i) {
-    if (i == 0 && worst != nullptr && worst->verdict == Verdict::kContradicted) out += "; ";
-    out += (i == 0 ? "likeliest cause: " : ", then: ");
-    out += fmt::format("{} ({})", name_of(v.found[i].departure), size_of(v.found[i]));
+  const bool by_claims = worst != nullptr && worst->verdict == Verdict::kContradicted;
+  if (by_known) parts.push_back(known->sentence);
+  if (by_claims) parts.push_back(differ);
+  std::string causes;
+  for (const DepartureTest& found : v.found) {
+    causes += (causes.empty() ? "likeliest cause: " : ", then: ");
+    causes += fmt::format("{} ({})", name_of(found.departure), size_of(found));
   }
-  if (v.found.empty()) out += "; none of the causes that are known here explains it";
-  return out;
+  if (!causes.empty()) parts.push_back(causes);
+  if (causes.empty() && (by_claims || !by_known))
+    parts.emplace_back("none of the causes that are known here explains it");
+  return "contradicted: " + joined(parts);
 }
 
 std::string verification_text(const Verification& verification) {
