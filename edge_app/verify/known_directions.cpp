@@ -81,6 +81,22 @@ Vector2<double> angles_between(const Vector3<double>& from, const Vector3<double
   return {angle, 0};
 }
 
+// The turn by roll, pitch and heading.
+Matrix3<double> turn_by(const Vector3<double>& angles) {
+  return rotation_about<double>(Vector3<double>::UnitZ(), angles.z()) *
+         rotation_about<double>(Vector3<double>::UnitY(), angles.y()) *
+         rotation_about<double>(Vector3<double>::UnitX(), angles.x());
+}
+
+// The axes about which each of the angles turns a direction that is turned already.
+Matrix3<double> axes_of(const Vector3<double>& angles) {
+  Matrix3<double> out;
+  out.col(0) = turn_by(angles) * Vector3<double>::UnitX();
+  out.col(1) = turn_by({0, 0, angles.z()}) * Vector3<double>::UnitY();
+  out.col(2) = Vector3<double>::UnitZ();
+  return out;
+}
+
 // Rows of one direction under a turn: one or two.
 struct Rows {
   Matrix<double, 2, 3> sides;
@@ -115,8 +131,10 @@ struct Stacked {
   std::vector<const Seen*> seen;  // of each row; null: of the turn
 };
 
-Stacked stack(const std::vector<Seen>& all, const Matrix3<double>& turn,
-              const Vector3<double>& turned, const Vector3<double>& sigma) {
+Stacked stack(const std::vector<Seen>& all, const Vector3<double>& turned,
+              const Vector3<double>& sigma) {
+  const Matrix3<double> turn = turn_by(turned);
+  const Matrix3<double> axes = axes_of(turned);
   Eigen::Index n = 0;
   for (const Seen& each : all) n += each.known.azimuth ? 2 : 1;
   for (int axis = 0; axis < 3; ++axis) n += sigma[axis] > 0 && std::isfinite(sigma[axis]) ? 1 : 0;
@@ -136,7 +154,8 @@ Stacked stack(const std::vector<Seen>& all, const Matrix3<double>& turn,
     out.r.segment(at, count) = whiten * rows.r.tail(count);
     out.of_motion.middleRows(at, count) = sides * turn * each.of_motion;
     out.of_parameters.middleRows(at, count) = sides * turn * each.of_parameters;
-    out.of_turn.middleRows(at, count) = -sides * skew(Vector3<double>(turn * each.direction));
+    out.of_turn.middleRows(at, count) =
+        -sides * skew(Vector3<double>(turn * each.direction)) * axes;
     out.stated.block(at, at, count, count) =
         each.known.sigma * each.known.sigma * whiten * whiten.transpose();
     out.seen.insert(out.seen.end(), static_cast<std::size_t>(count), &each);
@@ -327,24 +346,20 @@ KnownResult check_known(const std::vector<KnownSight>& sights, OrientationFrom f
   }
   if (all.empty()) return out;
   const Vector3<double> sigma(turn_sigma.level, turn_sigma.level, turn_sigma.heading);
-  const Vector3<double> begin(0, 0, std::isinf(turn_sigma.heading) ? common_heading(all) : 0);
-  Matrix3<double> turn = exp_so3(begin);
-  Vector3<double> turned = Vector3<double>::Zero();  // since `begin`
+  Vector3<double> turned(0, 0, std::isinf(turn_sigma.heading) ? common_heading(all) : 0);
   Stacked stacked;
   TurnFit fit;
   for (int step = 0; step < kMostSteps; ++step) {
-    stacked = stack(all, turn, turned, sigma);
+    stacked = stack(all, turned, sigma);
     fit = {};
     out.is_determined = fit_turn(stacked, sigma, &fit);
     if (!out.is_determined || fit.axes.empty()) break;
     const Eigen::VectorXd by_rows = fit.H * stacked.r;
     if (by_rows.norm() < kSmallStep_rad) break;
-    Vector3<double> by = Vector3<double>::Zero();
     for (std::size_t i = 0; i < fit.axes.size(); ++i)
-      by[fit.axes[i]] = by_rows[static_cast<Eigen::Index>(i)];
-    turn = (exp_so3(by) * turn).eval();
-    turned = log_so3(Matrix3<double>(turn * exp_so3(begin).transpose()));
+      turned[fit.axes[i]] += by_rows[static_cast<Eigen::Index>(i)];
   }
+  const Matrix3<double> turn = turn_by(turned);
   for (const Seen& each : all) {
     out.numbers += each.known.azimuth ? 2 : 1;
     out.offsets.push_back(offset_of(each, turn));
@@ -357,8 +372,7 @@ KnownResult check_known(const std::vector<KnownSight>& sights, OrientationFrom f
   out.rms_px = std::sqrt(out.rms_px / count);
   out.claimed_px = std::sqrt(out.claimed_px / count);
   if (!out.is_determined) return out;
-  out.turn = turned + begin;
-  out.turn.z() = wrap_angle(out.turn.z());
+  out.turn = {turned.x(), turned.y(), wrap_angle(turned.z())};
   judge(stacked, fit, &out);
   return out;
 }

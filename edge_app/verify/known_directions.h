@@ -77,8 +77,8 @@ struct KnownResult {
   double ratio = 0;
   double log_chance = 0;  // natural; of a ratio at least as large, if the sigmas hold
   double share = 0;       // of what remains, claimed by frames and calibration; the rest is stated
-  // Turns the platform's directions to the table's: roll, pitch and heading, rad. A sigma of 0: that
-  // axis is taken as stated, or makes no difference.
+  // The platform's roll, pitch and heading in the table's axes, rad. A sigma of 0: that angle is
+  // taken as stated, or makes no difference.
   Vector3<double> turn = Vector3<double>::Zero();
   Vector3<double> turn_sigma = Vector3<double>::Zero();
 };

@@ -118,6 +118,9 @@ TEST_F(VerifyTest, KnownDirectionsThatAgreeHold) {
   for (const auto& each : json["known"]) {
     EXPECT_EQ(each["verdict"], "holds") << each;
     EXPECT_GE(each["directions"], 10) << each;
+    EXPECT_EQ(each["offsets"].size(), each["directions"]);
+    EXPECT_LT(each["rms_px"], 1) << each;
+    EXPECT_GT(each["claimed_px"], 0) << each;
   }
   EXPECT_THAT(json["sentence"], HasSubstr("known directions, "));
   EXPECT_THAT(directory_.read("out/verification.html"), HasSubstr("Known directions"));
@@ -127,8 +130,32 @@ TEST_F(VerifyTest, APlatformThatWasSurveyedTurnedIsContradictedAndTheTurnSaid) {
   const Result result = verify(recording(), recording() + "/truth.yaml", {"--known", known(0.2)});
   ASSERT_EQ(result.exit_code, 1) << result.output << result.errors;
   EXPECT_THAT(result.output, HasSubstr("contradicted: known directions, "));
-  EXPECT_THAT(result.output, ContainsRegex("yaw 0\\.(19|20)"));
-  EXPECT_THAT(result.output, HasSubstr("is the platform where the survey has it"));
+  EXPECT_THAT(result.output,
+              ContainsRegex("they agree with the platform's heading 0\\.(199|200).* deg: is the "
+                            "platform where the survey has it"));
+}
+
+TEST_F(VerifyTest, AHeadingThatIsNotKnownIsEstimated) {
+  const Result result = verify(recording(), recording() + "/truth.yaml",
+                               {"--known", known(123), "--heading-sigma", "free", "--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.output << result.errors;
+  for (const auto& each : nlohmann::json::parse(result.output)["known"]) {
+    EXPECT_EQ(each["verdict"], "holds") << each;
+    EXPECT_NEAR(each["turn_deg"][2].get<double>(), 123, 0.01);
+    EXPECT_GT(each["turn_sigma_deg"][2].get<double>(), 0);
+    EXPECT_EQ(each["turn_sigma_deg"][0], 0);
+  }
+}
+
+TEST_F(VerifyTest, ATurnWithoutKnownDirectionsIsRefused) {
+  const Result result =
+      verify(recording(), recording() + "/truth.yaml", {"--heading-sigma", "free"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.errors, HasSubstr("--known"));
+  EXPECT_EQ(verify(recording(), recording() + "/truth.yaml",
+                   {"--known", known(0), "--level-sigma", "loose"})
+                .exit_code,
+            2);
 }
 
 TEST_F(VerifyTest, KnownDirectionsOfNoFrameAreRefused) {
@@ -137,9 +164,9 @@ TEST_F(VerifyTest, KnownDirectionsOfNoFrameAreRefused) {
                                             "999,10,20,0,0,0.01\n");
   const Result result = verify(recording(), recording() + "/truth.yaml", {"--known", file});
   EXPECT_EQ(result.exit_code, 2);
-  EXPECT_THAT(last_line(result.errors),
-              AllOf(HasSubstr("known.csv: frame 999 is not in the recording"),
-                    HasSubstr("which has frames 0 to 99")));
+  EXPECT_THAT(
+      last_line(result.errors),
+      HasSubstr("known.csv:2: frame 999 is not in the recording, whose frames are 0 to 99"));
 }
 
 TEST_F(VerifyTest, WhatCannotBeJudgedEndsWithTwo) {

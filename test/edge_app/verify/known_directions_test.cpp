@@ -29,8 +29,7 @@ constexpr TurnSigma kAnyTurn = {TurnSigma::kFree, TurnSigma::kFree};
 
 struct KnownErrors {
   Parameters parameters = Parameters::Zero();
-  Vector3<double> turn = Vector3<double>::Zero();  // platform to table, after the heading
-  double heading = 0;                              // likewise, of any size
+  Vector3<double> turn = Vector3<double>::Zero();  // the platform's roll, pitch and heading
   bool alike = false;                              // all frames have the same error
   bool two_zooms = false;                          // each with errors of its own
 };
@@ -39,8 +38,9 @@ struct KnownErrors {
 std::vector<KnownSight> survey(std::uint64_t seed, const KnownErrors& errors, int count = 12) {
   std::mt19937_64 generator(seed);
   std::normal_distribution<double> normal;
-  const Matrix3<double> turn =
-      exp_so3(errors.turn) * exp_so3(Vector3<double>(0, 0, errors.heading));
+  const Matrix3<double> turn = rotation_about<double>(Vector3<double>::UnitZ(), errors.turn.z()) *
+                               rotation_about<double>(Vector3<double>::UnitY(), errors.turn.y()) *
+                               rotation_about<double>(Vector3<double>::UnitX(), errors.turn.x());
   std::uniform_real_distribution<double> u(20, 620);
   std::uniform_real_distribution<double> v(20, 340);
   std::vector<Calibration> calibrations;
@@ -183,16 +183,21 @@ TEST(KnownDirections, ATurnedPlatformIsContradictedUnlessItsTurnIsEstimated) {
 TEST(KnownDirections, AnyHeadingIsEstimated) {
   for (const double heading : {-3.1, -1.5, 0.7, 3.0}) {
     KnownErrors errors;
-    errors.heading = heading;
-    const std::vector<KnownSight> sights = survey(3, errors);
-    for (const TurnSigma& turn : {kAnyHeading, kAnyTurn}) {
-      const KnownResult result = check(sights, turn);
+    errors.turn = {-0.02, 0.01, heading};
+    for (const bool is_level : {true, false}) {
+      if (is_level) errors.turn.head<2>().setZero();
+      const std::vector<KnownSight> sights = survey(3, errors);
+      const KnownResult result = check(sights, is_level ? kAnyHeading : kAnyTurn);
       ASSERT_TRUE(result.is_determined);
       EXPECT_GT(result.log_chance, std::log(1e-4)) << heading;
-      EXPECT_LT(std::abs(result.turn.z() - heading), 5 * result.turn_sigma.z()) << heading;
+      for (int i = is_level ? 2 : 0; i < 3; ++i) {
+        EXPECT_LT(std::abs(result.turn[i] - errors.turn[i]), 5 * result.turn_sigma[i]) << heading;
+        EXPECT_LT(result.turn_sigma[i], 1e-3);
+      }
       EXPECT_LT(result.rms, 1e-3);
+      EXPECT_LT(check(sights).log_chance, std::log(1e-4));
+      errors.turn = {-0.02, 0.01, heading};
     }
-    EXPECT_LT(check(sights).log_chance, std::log(1e-4));
   }
 }
 
