@@ -10,22 +10,14 @@
 #include "core/model/angle.h"
 #include "core/model/rolling_shutter.h"
 #include "core/model/rotation.h"
+#include "edge_app/verify/covariance_root.h"
 #include "platform/storage/csv_reader.h"
 
 namespace alidade {
 namespace {
 
 constexpr double kRadians = kPi / 180;
-constexpr double kSameLens = 1e-3;   // of f
 constexpr double kLeastPart = 1e-6;  // of the turn's best known axis, in variance; less is unknown
-
-// Roots of like covariances are alike.
-template <int N>
-Matrix<double, N, N> symmetric_root(const Matrix<double, N, N>& covariance) {
-  const Eigen::SelfAdjointEigenSolver<Matrix<double, N, N>> solver(covariance);
-  return solver.eigenvectors() * solver.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal() *
-         solver.eigenvectors().transpose();
-}
 
 // A direction as seen, in the platform frame, and how errors of unit variance move it.
 struct Seen {
@@ -48,9 +40,9 @@ bool see(const FrameOrientation& frame, const KnownDirection& known, Seen* out) 
   }
   out->frame = &frame;
   out->known = known;
-  out->of_motion = J_motion * symmetric_root<4>(frame.motion_covariance.topLeftCorner<4, 4>());
+  out->of_motion = J_motion * covariance_root(frame.motion_covariance.topLeftCorner<4, 4>());
   out->of_parameters = (J_parameters + J_motion * frame.motion_sensitivity.topRows<4>()) *
-                       symmetric_root<kParameterCount>(frame.calibration.covariance);
+                       covariance_root(frame.calibration.covariance);
   return true;
 }
 
@@ -172,8 +164,6 @@ Stacked stack(const std::vector<Seen>& all, const Vector3<double>& turned,
   return out;
 }
 
-double focal_length(const Seen& seen) { return seen.frame->calibration.camera.focal_length; }
-
 // The rows' covariance. alike: all frames have the same errors, and all zooms; else only the rows of
 // one frame, and of one zoom.
 Eigen::MatrixXd covariance_of(const Stacked& all, bool alike) {
@@ -186,8 +176,7 @@ Eigen::MatrixXd covariance_of(const Stacked& all, bool alike) {
       const Seen* b = all.seen[static_cast<std::size_t>(j)];
       if (a == nullptr || b == nullptr) continue;
       if (a->known.frame != b->known.frame) of_motion(i, j) = 0;
-      if (std::abs(std::log(focal_length(*a) / focal_length(*b))) > kSameLens)
-        of_parameters(i, j) = 0;
+      if (!is_same_zoom(*a->frame, *b->frame)) of_parameters(i, j) = 0;
     }
   }
   return of_motion + of_parameters + all.stated;

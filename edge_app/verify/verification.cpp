@@ -17,7 +17,6 @@ constexpr double kFalseAlarms = 0.01;  // of all comparisons together
 constexpr double kOtherPlace = 0.3;    // of the picture's width or height
 constexpr double kOtherSpeed = 0.5;    // of the largest difference of speeds
 constexpr double kOtherZoom = 0.02;    // of f
-constexpr double kSameZoom = 1e-3;     // likewise
 constexpr double kSharpEnough = 20;    // times the claimed sigma; a blunter test says nothing
 constexpr double kDegrees = 180 / kPi;
 
@@ -89,7 +88,7 @@ std::vector<PairRows> at_one_zoom(const std::vector<SeenFrame>& frames,
   std::vector<PairRows> out;
   for (const PairRows& pair : pairs) {
     const auto is_there = [&](std::size_t frame) {
-      return std::abs(log_f(frames[frame]) - log_f(frames[*reference])) <= kSameZoom;
+      return is_same_zoom(frames[frame].by_telemetry, frames[*reference].by_telemetry);
     };
     if (is_there(pair.first) && is_there(pair.second)) out.push_back(pair);
   }
@@ -102,14 +101,6 @@ Verdict verdict_of(const DepartureTest& test, double log_limit) {
   const bool is_blunt = test.claimed_sigma > 0 && !test.sigma.empty() &&
                         test.sigma.front() > kSharpEnough * test.claimed_sigma;
   return is_blunt ? Verdict::kNotJudged : Verdict::kHolds;
-}
-
-std::vector<Matrix4<double>> motion_covariances(const std::vector<SeenFrame>& frames,
-                                                OrientationFrom from) {
-  std::vector<Matrix4<double>> out;
-  for (const SeenFrame& frame : frames)
-    out.emplace_back(orientation(frame, from).motion_covariance.topLeftCorner<4, 4>());
-  return out;
 }
 
 // Telemetry's samples have so much to say of slow errors; the frames' covariances, taken as
@@ -239,11 +230,9 @@ Verification verify(const VerifyInput& input) {
         ClaimComparison comparison;
         comparison.kind = static_cast<ReturnKind>(kind);
         comparison.from = from;
-        comparison.result =
-            check_claims(pair_means(of_kind(comparison.kind, frames, all), noise_factor),
-                         motion_covariances(frames, from), calibration.covariance,
-                         from == OrientationFrom::kTelemetry ? motion_inflation(input, from) : 1,
-                         calibration.camera.focal_length);
+        comparison.result = check_claims(
+            pair_means(of_kind(comparison.kind, frames, all), noise_factor), frames, from,
+            from == OrientationFrom::kTelemetry ? motion_inflation(input, from) : 1);
         const ClaimResult& result = comparison.result;
         if (result.pairs >= kLeastPairs && result.freedom >= kLeastFreedom) {
           comparison.verdict =

@@ -11,7 +11,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr double kDegrees = 180 / kPi;
+constexpr double kInDegrees = 180 / kPi;
 
 ordered_json to_json(const ClaimComparison& comparison) {
   const ClaimResult& r = comparison.result;
@@ -55,11 +55,11 @@ ordered_json to_json(const KnownOffset& offset) {
   json["off_px"] = {offset.off_px.x(), offset.off_px.y()};
   json["claimed_px"] = offset.claimed_px;
   if (offset.known.azimuth) {
-    json["right_deg"] = kDegrees * offset.off.x();
-    json["right_sigma_deg"] = kDegrees * offset.sigma.x();
+    json["right_deg"] = kInDegrees * offset.off.x();
+    json["right_sigma_deg"] = kInDegrees * offset.sigma.x();
   }
-  json["up_deg"] = kDegrees * offset.off.y();
-  json["up_sigma_deg"] = kDegrees * offset.sigma.y();
+  json["up_deg"] = kInDegrees * offset.off.y();
+  json["up_sigma_deg"] = kInDegrees * offset.sigma.y();
   json["sigmas"] = offset.sigmas;
   return json;
 }
@@ -69,8 +69,8 @@ void add_turn(const KnownResult& result, ordered_json* json) {
   (*json)["turn_deg"] = ordered_json::array();
   (*json)["turn_sigma_deg"] = ordered_json::array();
   for (int axis = 0; axis < 3; ++axis) {
-    (*json)["turn_deg"].push_back(kDegrees * result.turn[axis]);
-    (*json)["turn_sigma_deg"].push_back(kDegrees * result.turn_sigma[axis]);
+    (*json)["turn_deg"].push_back(kInDegrees * result.turn[axis]);
+    (*json)["turn_sigma_deg"].push_back(kInDegrees * result.turn_sigma[axis]);
   }
 }
 
@@ -81,7 +81,7 @@ ordered_json to_json(const KnownComparison& comparison) {
   json["verdict"] = to_string(comparison.verdict);
   json["directions"] = r.offsets.size();
   json["rms_px"] = r.rms_px;
-  json["rms_deg"] = kDegrees * r.rms;
+  json["rms_deg"] = kInDegrees * r.rms;
   json["claimed_px"] = r.claimed_px;
   if (r.is_determined) {
     json["independent_numbers"] = r.freedom;
