@@ -12,31 +12,49 @@
 namespace alidade {
 namespace {
 
-using ParameterRoot = Matrix<double, kParameterCount, kParameterCount>;
-
-// What the frames claim.
+// What the frames of the pairs claim.
 struct Claims {
-  std::vector<Matrix4<double>> motion;
-  std::vector<ParameterRoot> parameters;  // root of the covariance
-  // Where calibrations have the same error: at one zoom, or, if alike, at all.
   std::vector<const FrameOrientation*> frames;
+  std::vector<Matrix4<double>> motion;
+  // Of each pair: what the calibrations' errors of unit variance do by its first and second frame.
+  std::vector<Sensitivity<2>> by_first, by_second;
+  // Calibrations have the same errors of unit variance at one zoom; if alike, at any.
   bool alike = false;
 };
 
-Matrix2<double> covariance_by(const Claims& claims, std::size_t frame_a, std::size_t frame_b,
-                              const Sensitivity<2>& P_a, const Sensitivity<2>& P_b) {
-  if (!claims.alike && !is_same_zoom(*claims.frames[frame_a], *claims.frames[frame_b]))
-    return Matrix2<double>::Zero();
-  return (P_a * claims.parameters[frame_a]) * (P_b * claims.parameters[frame_b]).transpose();
+Claims claims_of(const std::vector<PairMean>& pairs, const std::vector<SeenFrame>& frames,
+                 OrientationFrom from) {
+  Claims out;
+  std::vector<Matrix<double, kParameterCount, kParameterCount>> roots;
+  for (const SeenFrame& frame : frames) {
+    const FrameOrientation& is = orientation(frame, from);
+    out.frames.push_back(&is);
+    out.motion.emplace_back(is.motion_covariance.topLeftCorner<4, 4>());
+    roots.emplace_back(covariance_root(is.calibration.covariance));
+  }
+  for (const PairMean& pair : pairs) {
+    out.by_first.emplace_back(pair.P_first * roots[pair.first]);
+    out.by_second.emplace_back(pair.P_second * roots[pair.second]);
+  }
+  return out;
 }
 
-// Errors of pairs that share no frame are alike by the calibration alone.
-Matrix2<double> pair_covariance(const PairMean& a, const PairMean& b, const Claims& claims) {
+// Of two pairs by their indices. Errors of pairs that share no frame are alike by the calibration alone.
+Matrix2<double> pair_covariance(const std::vector<PairMean>& pairs, std::size_t index_a,
+                                std::size_t index_b, const Claims& claims) {
+  const PairMean& a = pairs[index_a];
+  const PairMean& b = pairs[index_b];
   const std::vector<Matrix4<double>>& motion = claims.motion;
-  Matrix2<double> out = covariance_by(claims, a.first, b.first, a.P_first, b.P_first) +
-                        covariance_by(claims, a.first, b.second, a.P_first, b.P_second) +
-                        covariance_by(claims, a.second, b.first, a.P_second, b.P_first) +
-                        covariance_by(claims, a.second, b.second, a.P_second, b.P_second);
+  Matrix2<double> out = Matrix2<double>::Zero();
+  const auto add = [&](std::size_t of_a, std::size_t of_b, const Sensitivity<2>& by_a,
+                       const Sensitivity<2>& by_b) {
+    if (claims.alike || is_same_zoom(*claims.frames[of_a], *claims.frames[of_b]))
+      out += by_a * by_b.transpose();
+  };
+  add(a.first, b.first, claims.by_first[index_a], claims.by_first[index_b]);
+  add(a.first, b.second, claims.by_first[index_a], claims.by_second[index_b]);
+  add(a.second, b.first, claims.by_second[index_a], claims.by_first[index_b]);
+  add(a.second, b.second, claims.by_second[index_a], claims.by_second[index_b]);
   if (a.first == b.first) out += a.J_first * motion[a.first] * b.J_first.transpose();
   if (a.first == b.second) out += a.J_first * motion[a.first] * b.J_second.transpose();
   if (a.second == b.first) out += a.J_second * motion[a.second] * b.J_first.transpose();
@@ -85,13 +103,7 @@ ClaimResult check_claims(const std::vector<PairMean>& pairs, const std::vector<S
   ClaimResult out;
   out.pairs = static_cast<int>(pairs.size());
   if (pairs.empty()) return out;
-  Claims claims;
-  for (const SeenFrame& frame : frames) {
-    const FrameOrientation& is = orientation(frame, from);
-    claims.motion.emplace_back(is.motion_covariance.topLeftCorner<4, 4>());
-    claims.parameters.emplace_back(covariance_root(is.calibration.covariance));
-    claims.frames.push_back(&is);
-  }
+  Claims claims = claims_of(pairs, frames, from);
   std::set<std::size_t> used;
   std::vector<Matrix2<double>> whiten;  // L^-1
   double squares = 0;
@@ -99,13 +111,14 @@ ClaimResult check_claims(const std::vector<PairMean>& pairs, const std::vector<S
   double normalised = 0;
   double claimed = 0;
   bool is_one_zoom = true;
-  for (const PairMean& pair : pairs) {
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const PairMean& pair = pairs[i];
     used.insert(pair.first);
     used.insert(pair.second);
     const FrameOrientation& second = *claims.frames[pair.second];
     is_one_zoom = is_one_zoom && is_same_zoom(*claims.frames[pairs.front().first], second) &&
                   is_same_zoom(*claims.frames[pair.first], second);
-    const Matrix2<double> covariance = pair_covariance(pair, pair, claims);
+    const Matrix2<double> covariance = pair_covariance(pairs, i, i, claims);
     const Matrix2<double> L = covariance.llt().matrixL();
     whiten.push_back(L.inverse());
     const double f = second.calibration.camera.focal_length;
@@ -124,7 +137,7 @@ ClaimResult check_claims(const std::vector<PairMean>& pairs, const std::vector<S
     for (std::size_t a = 0; a < pairs.size(); ++a) {
       for (std::size_t b = 0; b < pairs.size(); ++b) {
         const Matrix2<double> covariance =
-            whiten[a] * pair_covariance(pairs[a], pairs[b], claims) * whiten[b].transpose();
+            whiten[a] * pair_covariance(pairs, a, b, claims) * whiten[b].transpose();
         correlations += covariance.squaredNorm();
         if (a == b) here += covariance.trace();
       }

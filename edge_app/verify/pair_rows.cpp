@@ -36,8 +36,8 @@ bool linearise(const FrameOrientation& first, const FrameOrientation& second,
 }  // namespace
 
 bool is_same_zoom(const FrameOrientation& a, const FrameOrientation& b) {
-  return std::abs(std::log(a.calibration.camera.focal_length /
-                           b.calibration.camera.focal_length)) <= kSameZoom;
+  const double f = a.calibration.camera.focal_length;
+  return std::abs(b.calibration.camera.focal_length - f) <= kSameZoom * f;
 }
 
 std::vector<PairRows> pair_rows(const std::vector<SeenFrame>& frames,

@@ -54,7 +54,7 @@ TEST(ClaimCheck, FindsTrueClaimsTooSmallAsOftenAsChanceHasIt) {
 // The calibration of the one zoom has larger errors than that of the other. Whether errors of two
 // zooms are alike is not known, so the ratio may be less than 1, and alarms fewer.
 TEST(ClaimCheck, TakesEachZoomsOwnSigmas) {
-  constexpr int kRuns = 200;
+  constexpr int kRuns = 60;
   constexpr double kLevel = 0.05;
   int alarms = 0;
   double square = 0;
