@@ -259,17 +259,18 @@ KnownOffset offset_of(const Seen& seen, const Matrix3<double>& turn) {
   out.sigmas =
       std::sqrt(r.dot(rows.covariance.bottomRightCorner(count, count).llt().solve(r)) / count);
   const Vector3<double> d = turn * seen.direction;
-  const Vector3<double> there =
-      direction_at(seen.known.azimuth.value_or(azimuth_of(d)), seen.known.elevation);
   Vector2<double> pixel;
-  if (seen.frame->pixel(turn.transpose() * there, &pixel) == ProjectionStatus::kOk)
-    out.off_px = pixel - seen.known.pixel;
   Matrix2<double> px_per_rad = Matrix2<double>::Zero();
   for (int i = rows.first; i < 2; ++i) {
     const Vector3<double> moved = d + kStep_rad * rows.sides.row(i).transpose();
     if (seen.frame->pixel(turn.transpose() * moved, &pixel) == ProjectionStatus::kOk)
       px_per_rad.col(i) = (pixel - seen.known.pixel) / kStep_rad;
   }
+  const Vector3<double> there =
+      direction_at(seen.known.azimuth.value_or(azimuth_of(d)), seen.known.elevation);
+  const bool has_pixel =
+      seen.frame->pixel(turn.transpose() * there, &pixel) == ProjectionStatus::kOk;
+  out.off_px = has_pixel ? Vector2<double>(pixel - seen.known.pixel) : px_per_rad * rows.r;
   out.claimed_px = std::sqrt((px_per_rad * rows.covariance * px_per_rad.transpose()).trace());
   return out;
 }

@@ -59,11 +59,12 @@ struct KnownSight {
 // Known minus seen, after the turn. Sigmas by C. A horizon has only the second angle.
 struct KnownOffset {
   KnownDirection known;
-  Vector2<double> off = Vector2<double>::Zero();     // rad, to the right and up
-  Vector2<double> sigma = Vector2<double>::Zero();   // rad
-  Vector2<double> off_px = Vector2<double>::Zero();  // px, in the picture
-  double claimed_px = 0;                             // the length of off_px that C claims
-  double sigmas = 0;                                 // size of off by its covariance
+  Vector2<double> off = Vector2<double>::Zero();    // rad, to the right and up
+  Vector2<double> sigma = Vector2<double>::Zero();  // rad
+  // px, in the picture; to first order if the lens does not see so far.
+  Vector2<double> off_px = Vector2<double>::Zero();
+  double claimed_px = 0;  // the length of off_px that C claims
+  double sigmas = 0;      // size of off by its covariance
 };
 
 struct KnownResult {

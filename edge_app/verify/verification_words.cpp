@@ -231,7 +231,7 @@ std::string sentence_of(const KnownComparison& comparison) {
                      "apart, or its --heading-sigma and --level-sigma",
                      directions(r.offsets.size()));
   }
-  const std::string off = fmt::format("{} off by RMS {:.3g} px, {:.2f} times what the sigmas claim",
+  const std::string off = fmt::format("{} off by RMS {:.3g} px, {:.3g} times what the sigmas claim",
                                       directions(r.offsets.size()), r.rms_px, r.ratio);
   const std::string turn = turn_of(r, "with the platform as stated", "with the platform's ");
   if (comparison.verdict == Verdict::kNotJudged) {

@@ -195,7 +195,9 @@ TEST(KnownDirections, AnyHeadingIsEstimated) {
         EXPECT_LT(result.turn_sigma[i], 1e-3);
       }
       EXPECT_LT(result.rms, 1e-3);
-      EXPECT_LT(check(sights).log_chance, std::log(1e-4));
+      const KnownResult stated = check(sights);
+      EXPECT_LT(stated.log_chance, std::log(1e-4));
+      EXPECT_GT(stated.rms_px, 1000);
       errors.turn = {-0.02, 0.01, heading};
     }
   }
