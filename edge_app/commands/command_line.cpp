@@ -53,6 +53,13 @@ std::string is_accuracy(const std::string& text) {
              : fmt::format("'{}' is not a number of degrees from 0 to 5", text);
 }
 
+std::string is_turn_sigma(const std::string& text) {
+  const std::optional<double> value = number_of(text);
+  return text == "free" || (value && *value >= 0 && *value <= 10)
+             ? ""
+             : fmt::format("'{}' is neither a number of degrees from 0 to 10 nor free", text);
+}
+
 std::string is_share(const std::string& text) {
   const std::optional<double> value = number_of(text);
   return value && *value >= 0 && *value <= 1
@@ -159,6 +166,17 @@ void add_verify(CLI::App& app, int* exit_code) {
   command->add_option("recording", options->recording, "Directory of the recording")->required();
   command->add_option("--calibration", options->calibration,
                       "Calibration (default: DIR/alidade/calibration.yaml)");
+  CLI::Option* known =
+      command->add_option("--known", options->known,
+                          "Directions known from outside: a table of frame,u_px,v_px,azimuth_deg,"
+                          "elevation_deg,sigma_deg");
+  const auto add_turn = [&](const char* name, std::string* text, const char* help) {
+    command->add_option(name, *text, help)->type_name("DEG")->check(is_turn_sigma)->needs(known);
+  };
+  add_turn("--heading-sigma", &options->heading_sigma,
+           "Of the platform's heading in their axes, or free: it is estimated (default: 0, as "
+           "stated)");
+  add_turn("--level-sigma", &options->level_sigma, "Likewise of its roll and pitch");
   command->add_option("-o,--output", options->directory,
                       "Directory for verification.html (default: DIR/alidade)");
   add_zoom_tolerance(command, &options->zoom_tolerance);

@@ -8,11 +8,14 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <ctime>
 #include <string>
 #include <vector>
 
+#include "core/calibration/number_text.h"
+#include "core/model/angle.h"
 #include "edge_app/clocks/fresh_beginning.h"
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/output_directory.h"
@@ -30,6 +33,7 @@ namespace {
 
 struct VerifiedReplay {
   std::vector<SeenFrame> frames;
+  std::vector<KnownSight> known;
   int samples = 0;
   double telemetry_s = 0;  // from the first sample to the last
 };
@@ -44,10 +48,38 @@ std::vector<PanTiltSample> all_samples(const std::string& recording) {
   return out;
 }
 
+std::vector<KnownDirection> known_directions(const VerifyOptions& options,
+                                             const Camera<double>& camera,
+                                             const std::vector<FrameStamp>& stamps) {
+  std::vector<KnownDirection> known;
+  if (options.known.empty()) return known;
+  KnownLimits limits{camera.width, camera.height, {}};
+  for (const FrameStamp& stamp : stamps) limits.frames.push_back(stamp.frame);
+  std::sort(limits.frames.begin(), limits.frames.end());
+  std::string error;
+  if (!read_known_directions(options.known, limits, &known, &error))
+    throw CommandError(kExitUsage, error);
+  return known;
+}
+
+// text: degrees, "free" or empty, as the command line has checked it.
+double turn_sigma_of(const std::string& text) {
+  if (text == "free") return TurnSigma::kFree;
+  return number_of(text).value_or(0) * kPi / 180;
+}
+
+FrameOrientation orientation_in(const OrientationRecord& record, RecordMode mode) {
+  return record.mode == mode && record.orientation && record.calibrated
+             ? unpack(record.orientation->geometry, record.camera)
+             : FrameOrientation{};
+}
+
 VerifiedReplay replay_both_modes(const VerifyOptions& options, OrientationStepOptions of_step) {
   std::string error;
   std::vector<FrameStamp> stamps;
   if (!read_frames_csv(options.recording, &stamps, &error)) throw CommandError(kExitUsage, error);
+  const std::vector<KnownDirection> known =
+      known_directions(options, of_step.calibration.camera, stamps);
   OrientationStep by_telemetry(of_step);
   OrientationStep by_all_samples(of_step);
   of_step.oe = oe_options(of_step.calibration.camera);
@@ -87,6 +119,11 @@ VerifiedReplay replay_both_modes(const VerifyOptions& options, OrientationStepOp
     const OrientationRecord of_all_samples =
         by_all_samples.add_frame(frame->stamp, ImageView{}, &events);
     collection.add(of_landmarks, of_telemetry, of_all_samples, view_of(image));
+    for (const KnownDirection& each : known) {
+      if (each.frame != frame->stamp.frame) continue;
+      out.known.push_back({each, orientation_in(of_telemetry, RecordMode::kPt),
+                           orientation_in(of_landmarks, RecordMode::kOe)});
+    }
     by_telemetry.maintain();
     by_all_samples.maintain();
     by_landmarks.maintain();
@@ -117,9 +154,14 @@ Verification judge_recording(const VerifyOptions& options) {
   of_step.zoom_tolerance = options.zoom_tolerance;
   of_step.wait_for_pace = !noise.image_stamp_sigma_s;
   const VerifiedReplay replay = replay_both_modes(options, of_step);
-  return verify({options.recording, calibration.name, replay.frames, calibration.telemetry_error,
+  return verify({options.recording,
+                 calibration.name,
+                 replay.frames,
+                 calibration.telemetry_error,
                  of_step.telemetry_noise.pan_tilt_sigma,
-                 replay.telemetry_s > 0 ? (replay.samples - 1) / replay.telemetry_s : 0});
+                 replay.telemetry_s > 0 ? (replay.samples - 1) / replay.telemetry_s : 0,
+                 replay.known,
+                 {turn_sigma_of(options.heading_sigma), turn_sigma_of(options.level_sigma)}});
 }
 
 int exit_code_of(Verdict verdict) {

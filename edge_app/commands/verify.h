@@ -9,7 +9,10 @@ namespace alidade {
 struct VerifyOptions {
   std::string recording;
   std::string calibration;  // empty: <recording>/alidade/calibration.yaml
-  std::string directory;    // for verification.html; empty: <recording>/alidade
+  std::string known;        // DIRECTIONS.csv (docs/commands.md); empty: none
+  // Degrees or "free": of the platform's turn against the known directions. Empty: 0.
+  std::string heading_sigma, level_sigma;
+  std::string directory;  // for verification.html; empty: <recording>/alidade
   // Device units; readings that differ by no more are one zoom. Empty: found from their jitter.
   std::optional<double> zoom_tolerance;
   bool json = false;

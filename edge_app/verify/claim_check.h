@@ -2,7 +2,8 @@
 // Whether directions of one place, by two frames, differ by as much as their sigmas claim.
 //   y_p = mean of the residuals of pair p,  C_p = its covariance by both frames and the calibration
 //   ratio^2 = mean of y_p^T C_p^-1 y_p / 2
-// An error of the calibration counts by the difference of its effects on the two frames. Errors of
+// An error of the calibration counts by the difference of its effects on the two frames. Whether
+// those of two zooms are alike is not known: each is tried, and what claims most counts. Errors of
 // the two frames count as independent. Errors of a common map are not, which makes the ratio too
 // small, never too large. Pairs are correlated if they share frames, and by the calibration; with R
 // the correlations of all y_p, whitened pair by pair,
@@ -25,7 +26,8 @@ struct PairMean {
   Matrix2<double> noise = Matrix2<double>::Zero();               // px^2, of the places
   Matrix<double, 2, 4> J_first = Matrix<double, 2, 4>::Zero();   // as in pair_rows.h
   Matrix<double, 2, 4> J_second = Matrix<double, 2, 4>::Zero();  // likewise
-  Sensitivity<2> P = Sensitivity<2>::Zero();                     // P_first + P_second
+  Sensitivity<2> P_first = Sensitivity<2>::Zero();               // likewise
+  Sensitivity<2> P_second = Sensitivity<2>::Zero();              // likewise
 };
 
 struct ClaimResult {
@@ -44,13 +46,11 @@ struct ClaimResult {
 [[nodiscard]] std::vector<PairMean> pair_means(const std::vector<PairRows>& pairs,
                                                double noise_factor);
 
-// motion: covariance of each frame's (pan, tilt, pan rate, tilt rate), rad, rad/s.
+// frames: those that the pairs count, with the orientations that `from` takes.
 // motion_inflation: >= 1, how many neighbouring frames share an error and count as one.
-// focal_length: px.
 [[nodiscard]] ClaimResult check_claims(const std::vector<PairMean>& pairs,
-                                       const std::vector<Matrix4<double>>& motion,
-                                       const ParameterCovariance<double>& parameters,
-                                       double motion_inflation, double focal_length);
+                                       const std::vector<SeenFrame>& frames, OrientationFrom from,
+                                       double motion_inflation);
 
 // The value that chi-square with `freedom` degrees of freedom exceeds as probably as a standard
 // normal number exceeds z (Wilson and Hilferty).

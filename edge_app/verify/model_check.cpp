@@ -9,6 +9,7 @@
 
 #include "core/calibration/chance.h"
 #include "core/model/median.h"
+#include "edge_app/verify/covariance_root.h"
 #include "edge_app/verify/departure_columns.h"
 
 namespace alidade {
@@ -18,18 +19,6 @@ constexpr std::size_t kMostFound = 4;
 constexpr double kHuber = 3;       // sigmas of noise; a residual beyond counts less
 constexpr double kNotSeen = 1e-9;  // share of a column that nothing else explains
 constexpr int kFrameErrors = 4;    // pan, tilt, their rates
-
-// L with covariance = L L^T; a zero row stays zero.
-Eigen::MatrixXd root_of(const Eigen::MatrixXd& covariance) {
-  // By its correlations, as units differ by many powers of ten.
-  Eigen::VectorXd sigma = covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
-  Eigen::VectorXd inverse = sigma;
-  for (double& each : inverse) each = each > 0 ? 1 / each : 0;
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(inverse.asDiagonal() * covariance *
-                                                              inverse.asDiagonal());
-  return sigma.asDiagonal() * solver.eigenvectors() *
-         solver.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
-}
 
 // The equations of all pairs. Unknowns, whitened by their claimed covariance: each frame's errors,
 // the parameters, what is left of telemetry's known errors. Then the departures, and r.
@@ -42,12 +31,12 @@ class PairEquations {
     for (const SeenFrame& frame : frames) {
       const Matrix4<double> covariance =
           motion_inflation * frame.by_all_samples.motion_covariance.topLeftCorner<4, 4>();
-      frame_roots_.emplace_back(root_of(covariance));
+      frame_roots_.emplace_back(covariance_root(covariance));
     }
     ParameterCovariance<double> parameters = calibration.covariance;
     parameters(index(Parameter::kClockOffset), index(Parameter::kClockOffset)) +=
         shared_time_variance();
-    parameter_root_ = root_of(parameters);
+    parameter_root_ = covariance_root(parameters);
     for (const DepartureColumns& departure : departures_) {
       first_column_.push_back(columns_);
       columns_ += departure.count();

@@ -1,5 +1,7 @@
 #include "edge_app/verify/pair_rows.h"
 
+#include <cmath>
+
 namespace alidade {
 namespace {
 
@@ -32,6 +34,11 @@ bool linearise(const FrameOrientation& first, const FrameOrientation& second,
 }
 
 }  // namespace
+
+bool is_same_zoom(const FrameOrientation& a, const FrameOrientation& b) {
+  const double f = a.calibration.camera.focal_length;
+  return std::abs(b.calibration.camera.focal_length - f) <= kSameZoom * f;
+}
 
 std::vector<PairRows> pair_rows(const std::vector<SeenFrame>& frames,
                                 const std::vector<PlacePair>& pairs, OrientationFrom from) {

@@ -44,6 +44,11 @@ struct PairRows {
   return frame.by_landmarks;
 }
 
+inline constexpr double kSameZoom = 1e-3;  // of f
+
+// Whether both were taken at one zoom, so that their calibrations have the same error.
+[[nodiscard]] bool is_same_zoom(const FrameOrientation& a, const FrameOrientation& b);
+
 // from: which orientation of each frame is used. A pair is left out if one of its frames has no
 // such orientation.
 [[nodiscard]] std::vector<PairRows> pair_rows(const std::vector<SeenFrame>& frames,

@@ -17,7 +17,6 @@ constexpr double kFalseAlarms = 0.01;  // of all comparisons together
 constexpr double kOtherPlace = 0.3;    // of the picture's width or height
 constexpr double kOtherSpeed = 0.5;    // of the largest difference of speeds
 constexpr double kOtherZoom = 0.02;    // of f
-constexpr double kSameZoom = 1e-3;     // likewise
 constexpr double kSharpEnough = 20;    // times the claimed sigma; a blunter test says nothing
 constexpr double kDegrees = 180 / kPi;
 
@@ -89,7 +88,7 @@ std::vector<PairRows> at_one_zoom(const std::vector<SeenFrame>& frames,
   std::vector<PairRows> out;
   for (const PairRows& pair : pairs) {
     const auto is_there = [&](std::size_t frame) {
-      return std::abs(log_f(frames[frame]) - log_f(frames[*reference])) <= kSameZoom;
+      return is_same_zoom(frames[frame].by_telemetry, frames[*reference].by_telemetry);
     };
     if (is_there(pair.first) && is_there(pair.second)) out.push_back(pair);
   }
@@ -102,14 +101,6 @@ Verdict verdict_of(const DepartureTest& test, double log_limit) {
   const bool is_blunt = test.claimed_sigma > 0 && !test.sigma.empty() &&
                         test.sigma.front() > kSharpEnough * test.claimed_sigma;
   return is_blunt ? Verdict::kNotJudged : Verdict::kHolds;
-}
-
-std::vector<Matrix4<double>> motion_covariances(const std::vector<SeenFrame>& frames,
-                                                OrientationFrom from) {
-  std::vector<Matrix4<double>> out;
-  for (const SeenFrame& frame : frames)
-    out.emplace_back(orientation(frame, from).motion_covariance.topLeftCorner<4, 4>());
-  return out;
 }
 
 // Telemetry's samples have so much to say of slow errors; the frames' covariances, taken as
@@ -172,6 +163,39 @@ std::vector<std::string> advice_for(const VerifyInput& input, const Verification
   return out;
 }
 
+// The turn of the platform that the known directions would agree with.
+std::optional<KnownResult> turn_that_agrees(const VerifyInput& input, OrientationFrom from,
+                                            double log_limit) {
+  const TurnSigma& stated = input.turn_sigma;
+  for (const TurnSigma& tried :
+       {TurnSigma{TurnSigma::kFree, stated.level}, TurnSigma{TurnSigma::kFree, TurnSigma::kFree}}) {
+    if (tried.heading == stated.heading && tried.level == stated.level) continue;
+    KnownResult result = check_known(input.known, from, tried);
+    const bool is_new = !result.turn_sigma.isZero();
+    if (result.is_determined && is_new && result.log_chance >= log_limit) return result;
+  }
+  return std::nullopt;
+}
+
+void judge_known(const VerifyInput& input, double log_limit, Verification* out) {
+  for (const OrientationFrom from : {OrientationFrom::kLandmarks, OrientationFrom::kTelemetry}) {
+    KnownComparison comparison;
+    comparison.from = from;
+    comparison.result = check_known(input.known, from, input.turn_sigma);
+    const KnownResult& result = comparison.result;
+    if (result.is_determined && result.log_chance < log_limit) {
+      comparison.verdict = Verdict::kContradicted;
+      comparison.turned = turn_that_agrees(input, from, log_limit);
+      out->verdict = Verdict::kContradicted;
+    } else if (result.is_determined && result.share >= kLeastShare) {
+      comparison.verdict = Verdict::kHolds;
+      if (out->verdict == Verdict::kNotJudged) out->verdict = Verdict::kHolds;
+    }
+    comparison.sentence = sentence_of(comparison);
+    out->known.push_back(std::move(comparison));
+  }
+}
+
 }  // namespace
 
 Verification verify(const VerifyInput& input) {
@@ -183,7 +207,8 @@ Verification verify(const VerifyInput& input) {
   out.by_all_samples = pair_rows(frames, pairs, OrientationFrom::kAllSamples);
   out.pairs = static_cast<int>(out.by_telemetry.size());
   constexpr int kKinds = static_cast<int>(ReturnKind::kCount);
-  out.chance_limit = kFalseAlarms / (2 * kKinds + kDepartureCount);
+  const int of_known = input.known.empty() ? 0 : 2;
+  out.chance_limit = kFalseAlarms / (2 * kKinds + kDepartureCount + of_known);
   const double log_limit = std::log(out.chance_limit);
   if (!out.by_telemetry.empty()) {
     std::size_t reference = 0;
@@ -205,11 +230,9 @@ Verification verify(const VerifyInput& input) {
         ClaimComparison comparison;
         comparison.kind = static_cast<ReturnKind>(kind);
         comparison.from = from;
-        comparison.result =
-            check_claims(pair_means(of_kind(comparison.kind, frames, all), noise_factor),
-                         motion_covariances(frames, from), calibration.covariance,
-                         from == OrientationFrom::kTelemetry ? motion_inflation(input, from) : 1,
-                         calibration.camera.focal_length);
+        comparison.result = check_claims(
+            pair_means(of_kind(comparison.kind, frames, all), noise_factor), frames, from,
+            from == OrientationFrom::kTelemetry ? motion_inflation(input, from) : 1);
         const ClaimResult& result = comparison.result;
         if (result.pairs >= kLeastPairs && result.freedom >= kLeastFreedom) {
           comparison.verdict =
@@ -231,6 +254,7 @@ Verification verify(const VerifyInput& input) {
     if (comparison.verdict == Verdict::kContradicted) out.verdict = Verdict::kContradicted;
   }
   if (!is_enough) out.found.clear();
+  if (!input.known.empty()) judge_known(input, log_limit, &out);
   out.advice = advice_for(input, out);
   out.sentence = summary_of(out);
   return out;

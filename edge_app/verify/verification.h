@@ -1,9 +1,11 @@
 #pragma once
-// Verification: how good a calibration is on a recording, judged by the recording alone. Two kinds
-// of comparison, each with a limit that follows from its distribution:
+// Verification: how good a calibration is on a recording. Two kinds of comparison are judged by the
+// recording alone, a third by what is known from outside; each has a limit that follows from its
+// distribution:
 //   claims    directions of places that were seen twice, by kind of return and by mode, against the
 //             sigmas of the records (claim_check.h)
 //   model     telemetry and pictures against the calibration, by departure (model_check.h)
+//   known     directions of pixels, by mode, against those that somebody knows (known_directions.h)
 // If all sigmas are true, the comparisons together contradict at most one calibration in a hundred
 // (Bonferroni). Pure; allocates.
 
@@ -12,6 +14,7 @@
 #include <vector>
 
 #include "edge_app/verify/claim_check.h"
+#include "edge_app/verify/known_directions.h"
 #include "edge_app/verify/model_check.h"
 
 namespace alidade {
@@ -48,6 +51,15 @@ struct ModelComparison {
   std::string sentence;  // the verdict in words
 };
 
+struct KnownComparison {
+  OrientationFrom from = OrientationFrom::kLandmarks;
+  Verdict verdict = Verdict::kNotJudged;
+  KnownResult result;
+  // Contradicted, but not once the platform's turn is estimated: by the heading alone, or in all.
+  std::optional<KnownResult> turned;
+  std::string sentence;  // the verdict in words
+};
+
 struct VerifyInput {
   std::string recording;                 // its name
   std::string calibration;               // its name
@@ -55,6 +67,8 @@ struct VerifyInput {
   TelemetryError telemetry_error;        // of the calibration
   double telemetry_sigma_rad = 0;        // white noise of a sample, as was assumed; 0: not known
   double telemetry_rate_hz = 0;          // samples per second
+  std::vector<KnownSight> known = {};    // empty: nothing is known from outside
+  TurnSigma turn_sigma = {};             // of the platform against the known directions' axes
 };
 
 struct Verification {
@@ -67,6 +81,7 @@ struct Verification {
   double chance_limit = 0;              // a comparison less probable than this contradicts; 0 to 1
   std::vector<ClaimComparison> claims;  // each kind for landmarks, then for telemetry; may be empty
   std::vector<ModelComparison> model;   // each departure; empty as claims: there are no pairs
+  std::vector<KnownComparison> known;   // landmarks, then telemetry; empty: nothing is known
   std::vector<DepartureTest> found;     // see ModelCheckResult; empty if pairs < kLeastPairs
   // For plots: one entry for each pair that could be compared.
   std::vector<PairRows> by_landmarks, by_telemetry, by_all_samples;
@@ -75,6 +90,8 @@ struct Verification {
 // A comparison with fewer independent numbers, or fewer pairs, is not judged.
 inline constexpr double kLeastFreedom = 12;
 inline constexpr int kLeastPairs = 20;
+// Known directions are not judged if less of their covariance is claimed by frames and calibration.
+inline constexpr double kLeastShare = 0.1;
 
 [[nodiscard]] Verification verify(const VerifyInput& input);
 

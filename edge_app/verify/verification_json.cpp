@@ -3,12 +3,15 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "core/model/angle.h"
 #include "edge_app/verify/verification_words.h"
 
 namespace alidade {
 namespace {
 
 using nlohmann::ordered_json;
+
+constexpr double kInDegrees = 180 / kPi;
 
 ordered_json to_json(const ClaimComparison& comparison) {
   const ClaimResult& r = comparison.result;
@@ -44,6 +47,60 @@ ordered_json to_json(const DepartureTest& test) {
   return json;
 }
 
+ordered_json to_json(const KnownOffset& offset) {
+  ordered_json json;
+  json["frame"] = offset.known.frame;
+  json["u_px"] = offset.known.pixel.x();
+  json["v_px"] = offset.known.pixel.y();
+  json["off_px"] = {offset.off_px.x(), offset.off_px.y()};
+  json["claimed_px"] = offset.claimed_px;
+  if (offset.known.azimuth) {
+    json["right_deg"] = kInDegrees * offset.off.x();
+    json["right_sigma_deg"] = kInDegrees * offset.sigma.x();
+  }
+  json["up_deg"] = kInDegrees * offset.off.y();
+  json["up_sigma_deg"] = kInDegrees * offset.sigma.y();
+  json["sigmas"] = offset.sigmas;
+  return json;
+}
+
+// Axes that are taken as stated have a sigma of 0.
+void add_turn(const KnownResult& result, ordered_json* json) {
+  (*json)["turn_deg"] = ordered_json::array();
+  (*json)["turn_sigma_deg"] = ordered_json::array();
+  for (int axis = 0; axis < 3; ++axis) {
+    (*json)["turn_deg"].push_back(kInDegrees * result.turn[axis]);
+    (*json)["turn_sigma_deg"].push_back(kInDegrees * result.turn_sigma[axis]);
+  }
+}
+
+ordered_json to_json(const KnownComparison& comparison) {
+  const KnownResult& r = comparison.result;
+  ordered_json json;
+  json["mode"] = comparison.from == OrientationFrom::kLandmarks ? "OE" : "PT";
+  json["verdict"] = to_string(comparison.verdict);
+  json["directions"] = r.offsets.size();
+  json["rms_px"] = r.rms_px;
+  json["rms_deg"] = kInDegrees * r.rms;
+  json["claimed_px"] = r.claimed_px;
+  if (r.is_determined) {
+    json["independent_numbers"] = r.freedom;
+    json["ratio"] = r.ratio;
+    json["chance"] = std::exp(r.log_chance);
+    json["camera_share"] = r.share;
+    add_turn(r, &json);
+  }
+  if (comparison.turned) {
+    json["turned"]["ratio"] = comparison.turned->ratio;
+    json["turned"]["chance"] = std::exp(comparison.turned->log_chance);
+    add_turn(*comparison.turned, &json["turned"]);
+  }
+  json["sentence"] = comparison.sentence;
+  json["offsets"] = ordered_json::array();
+  for (const KnownOffset& each : r.offsets) json["offsets"].push_back(to_json(each));
+  return json;
+}
+
 }  // namespace
 
 std::string verification_json(const Verification& verification,
@@ -66,6 +123,8 @@ std::string verification_json(const Verification& verification,
     each["sentence"] = comparison.sentence;
     json["model"].push_back(std::move(each));
   }
+  json["known"] = ordered_json::array();
+  for (const KnownComparison& known : verification.known) json["known"].push_back(to_json(known));
   json["causes"] = ordered_json::array();
   for (const DepartureTest& found : verification.found) json["causes"].push_back(to_json(found));
   for (const auto& [kind, path] : files) json["files"][kind] = path;

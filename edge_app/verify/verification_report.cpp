@@ -189,6 +189,65 @@ std::string lens_plot(const Verification& v, int axis) {
       plot.svg("residuals over the picture"));
 }
 
+// Each known direction: how far off, with its sigma.
+std::string known_plot(const KnownComparison& known, int axis) {
+  std::vector<PlotPoint> points;
+  double reach = 1e-6;
+  const std::vector<KnownOffset>& offsets = known.result.offsets;
+  for (const KnownOffset& each : offsets)
+    reach = std::max(reach, kDegreesARadian * (std::abs(each.off[axis]) + each.sigma[axis]));
+  const char* name = axis == 0 ? "Known minus seen, to the right" : "Known minus seen, up";
+  SvgPlot plot(kHalf_px, kHeight_px,
+               {0, static_cast<double>(offsets.size()) + 1, "direction, in the table's order"},
+               {-1.1 * reach, 1.1 * reach, "deg"});
+  plot.level(0);
+  const char* colour = colour_of(known.verdict);
+  for (std::size_t i = 0; i < offsets.size(); ++i) {
+    if (axis == 0 && !offsets[i].known.azimuth) continue;
+    const double x = static_cast<double>(i) + 1;
+    const double y = kDegreesARadian * offsets[i].off[axis];
+    const double sigma = kDegreesARadian * offsets[i].sigma[axis];
+    plot.line({{x, y - sigma}, {x, y + sigma}}, "faint");
+    points.push_back({x, y});
+  }
+  plot.dots(points, colour, 5);
+  return html_figure(fmt::format("<b>Known directions, {} mode.</b> {}; with one sigma",
+                                 known.from == OrientationFrom::kLandmarks ? "OE" : "PT", name),
+                     plot.svg("known directions"));
+}
+
+std::string known_table(const KnownComparison& known) {
+  std::string out =
+      "<div class=\"scroll\"><table>\n<thead><tr><th>frame</th><th>u, px</th><th>v, px</th>"
+      "<th>off, px</th><th>claimed, px</th><th>right, deg</th><th>up, deg</th><th>sigmas</th></tr>"
+      "</thead>\n<tbody>\n";
+  const auto angle = [](const KnownOffset& offset, int axis) {
+    return fmt::format("{:.5f} +- {:.5f}", kDegreesARadian * offset.off[axis],
+                       kDegreesARadian * offset.sigma[axis]);
+  };
+  for (const KnownOffset& each : known.result.offsets) {
+    out += fmt::format(
+        "<tr><td>{}</td><td>{:.2f}</td><td>{:.2f}</td><td>({:.2f}, {:.2f})</td><td>{:.2f}</td>"
+        "<td>{}</td><td>{}</td><td>{:.2f}</td></tr>\n",
+        each.known.frame, each.known.pixel.x(), each.known.pixel.y(), each.off_px.x(),
+        each.off_px.y(), each.claimed_px, each.known.azimuth ? angle(each, 0) : "horizon",
+        angle(each, 1), each.sigmas);
+  }
+  return out + "</tbody>\n</table></div>\n";
+}
+
+std::string known_part(const Verification& v) {
+  if (v.known.empty()) return "";
+  std::string out = "<h2>Known directions</h2>\n";
+  for (const KnownComparison& known : v.known) {
+    out += "<p>" + escape_html(known.sentence) + "</p>\n";
+    if (known.result.offsets.empty()) continue;
+    out += "<div class=\"pair\">\n" + known_plot(known, 0) + known_plot(known, 1) + "</div>\n" +
+           known_table(known);
+  }
+  return out;
+}
+
 }  // namespace
 
 std::string verification_report(const Verification& v, const VerificationOrigin& origin) {
@@ -205,7 +264,7 @@ std::string verification_report(const Verification& v, const VerificationOrigin&
       "<ul class=\"facts\">\n<li><b>{}</b>pairs of pictures</li>\n<li><b>{}</b>places found again"
       "</li>\n<li><b>{:.2f}</b>picture noise / stated noise</li>\n</ul>\n",
       v.pairs, v.places, v.noise_ratio);
-  body += html_list("What would help", v.advice);
+  body += html_list("What would help", v.advice) + known_part(v);
   if (v.pairs > 0) {
     body += claims_table(v) + ratio_plot(v) + model_table(v) + curves(v);
     if (!v.by_landmarks.empty())

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/model/angle.h"
+
 namespace alidade {
 namespace {
 
@@ -17,6 +19,39 @@ double largest_sigmas(const DepartureTest& test) {
   for (std::size_t i = 0; i < test.size.size(); ++i) {
     if (test.sigma[i] > 0) out = std::max(out, std::abs(test.size[i]) / test.sigma[i]);
   }
+  return out;
+}
+
+// The comparison with what is known from outside that decides; null: none.
+const KnownComparison* worst_known(const Verification& verification) {
+  const KnownComparison* worst = nullptr;
+  for (const KnownComparison& each : verification.known) {
+    if (each.verdict == Verdict::kNotJudged) continue;
+    if (worst == nullptr || each.result.log_chance < worst->result.log_chance) worst = &each;
+  }
+  return worst;
+}
+
+std::string directions(std::size_t count) {
+  return fmt::format("{} direction{}", count, count == 1 ? "" : "s");
+}
+
+// The platform's turn, axis by axis, if any was estimated.
+std::string turn_of(const KnownResult& result, const char* if_none, const char* before) {
+  constexpr double kDegrees = 180 / kPi;
+  constexpr const char* kNames[] = {"roll", "pitch", "heading"};
+  std::string out;
+  for (const int axis : {2, 1, 0}) {
+    if (!(result.turn_sigma[axis] > 0)) continue;
+    out += fmt::format("{}{} {:.4f} +- {:.2g} deg", out.empty() ? before : ", ", kNames[axis],
+                       kDegrees * result.turn[axis], kDegrees * result.turn_sigma[axis]);
+  }
+  return out.empty() ? if_none : out;
+}
+
+std::string joined(const std::vector<std::string>& parts) {
+  std::string out;
+  for (const std::string& part : parts) out += (out.empty() ? "" : "; ") + part;
   return out;
 }
 
@@ -186,7 +221,40 @@ std::string sentence_of(const ModelComparison& comparison) {
   return name;
 }
 
+std::string sentence_of(const KnownComparison& comparison) {
+  const KnownResult& r = comparison.result;
+  std::string out = fmt::format("known directions, {}: ", mode_of(comparison.from));
+  if (r.offsets.empty()) return out + "not judged; none of their frames has an orientation";
+  if (!r.is_determined) {
+    return out + fmt::format(
+                     "not judged; {} do not tell how the platform is turned; give more, farther "
+                     "apart, or its --heading-sigma and --level-sigma",
+                     directions(r.offsets.size()));
+  }
+  const std::string off = fmt::format("{} off by RMS {:.3g} px, {:.3g} times what the sigmas claim",
+                                      directions(r.offsets.size()), r.rms_px, r.ratio);
+  const std::string turn = turn_of(r, "with the platform as stated", "with the platform's ");
+  if (comparison.verdict == Verdict::kNotJudged) {
+    return out +
+           fmt::format("{}, {}; not judged, as their stated sigma is {:.0f} % of the variance", off,
+                       turn, 100 * (1 - r.share));
+  }
+  if (comparison.verdict == Verdict::kHolds) return out + off + ", " + turn;
+  out += off + ", more than chance, " + turn;
+  if (comparison.turned) {
+    return out + turn_of(*comparison.turned, "", "; they agree with the platform's ") +
+           ": is the platform where the survey has it, and the head's zero?";
+  }
+  const auto worst = std::max_element(
+      r.offsets.begin(), r.offsets.end(),
+      [](const KnownOffset& a, const KnownOffset& b) { return a.sigmas < b.sigmas; });
+  return out + fmt::format("; worst is that of frame {} at ({:g}, {:g}), by {:.3g} sigmas",
+                           worst->known.frame, worst->known.pixel.x(), worst->known.pixel.y(),
+                           worst->sigmas);
+}
+
 std::string summary_of(const Verification& v) {
+  const KnownComparison* known = worst_known(v);
   const ClaimComparison* worst = worst_claim(v);
   const std::string differ =
       worst == nullptr
@@ -196,26 +264,33 @@ std::string summary_of(const Verification& v) {
                 "sigma claims (limit {:.2f}; {}, {})",
                 worst->result.ratio, worst->result.ratio / std::max(1e-9, worst->result.low),
                 name_of(worst->kind), mode_of(worst->from));
+  std::vector<std::string> parts;
   switch (v.verdict) {
     case Verdict::kNotJudged:
-      return fmt::format(
-          "not judged: {} pairs of pictures show the same places again ({} are "
-          "needed)",
-          v.pairs, kLeastPairs);
+      parts.push_back(fmt::format("{} pairs of pictures show the same places again ({} are needed)",
+                                  v.pairs, kLeastPairs));
+      if (!v.known.empty()) parts.push_back(v.known.front().sentence);
+      return "not judged: " + joined(parts);
     case Verdict::kHolds:
-      return "sigmas hold: " + differ;
+      if (!differ.empty()) parts.push_back(differ);
+      if (known != nullptr) parts.push_back(known->sentence);
+      return "sigmas hold: " + joined(parts);
     case Verdict::kContradicted:
       break;
   }
-  std::string out = "contradicted: ";
-  if (worst != nullptr && worst->verdict == Verdict::kContradicted) out += differ;
-  for (std::size_t i = 0; i < v.found.size(); ++i) {
-    if (i == 0 && out.size() > 14) out += "; ";
-    out += (i == 0 ? "likeliest cause: " : ", then: ");
-    out += fmt::format("{} ({})", name_of(v.found[i].departure), size_of(v.found[i]));
+  const bool by_known = known != nullptr && known->verdict == Verdict::kContradicted;
+  const bool by_claims = worst != nullptr && worst->verdict == Verdict::kContradicted;
+  if (by_known) parts.push_back(known->sentence);
+  if (by_claims) parts.push_back(differ);
+  std::string causes;
+  for (const DepartureTest& found : v.found) {
+    causes += (causes.empty() ? "likeliest cause: " : ", then: ");
+    causes += fmt::format("{} ({})", name_of(found.departure), size_of(found));
   }
-  if (v.found.empty()) out += "; none of the causes that are known here explains it";
-  return out;
+  if (!causes.empty()) parts.push_back(causes);
+  if (causes.empty() && (by_claims || !by_known))
+    parts.emplace_back("none of the causes that are known here explains it");
+  return "contradicted: " + joined(parts);
 }
 
 std::string verification_text(const Verification& verification) {
@@ -224,6 +299,8 @@ std::string verification_text(const Verification& verification) {
     if (comparison.result.pairs > 0) out += fmt::format("  {}\n", comparison.sentence);
   }
   for (const ModelComparison& comparison : verification.model)
+    out += fmt::format("  {}\n", comparison.sentence);
+  for (const KnownComparison& comparison : verification.known)
     out += fmt::format("  {}\n", comparison.sentence);
   for (const std::string& advice : verification.advice) out += fmt::format("advice: {}\n", advice);
   return out;

@@ -18,6 +18,7 @@ namespace alidade {
 
 [[nodiscard]] std::string sentence_of(const ClaimComparison& comparison);
 [[nodiscard]] std::string sentence_of(const ModelComparison& comparison);
+[[nodiscard]] std::string sentence_of(const KnownComparison& comparison);
 // The verdict, with the number that matters and the likeliest causes.
 [[nodiscard]] std::string summary_of(const Verification& verification);
 

@@ -4,11 +4,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
+#include "core/realtime/frame_orientation.h"
+#include "edge_app/storage/calibration_file.h"
 #include "test/edge_app/commands/alidade_command.h"
 #include "test/edge_app/commands/filmed_recording.h"
 #include "test/support/temporary_directory.h"
@@ -45,6 +48,31 @@ class VerifyTest : public ::testing::Test {
     return alidade(arguments);
   }
 
+  // Where pixels of the frames look, by the true angles, each turned to the right by yaw_deg.
+  std::string known(double yaw_deg) {
+    Calibration truth;
+    std::string error;
+    EXPECT_TRUE(load_calibration(recording() + "/truth.yaml", &truth, &error)) << error;
+    const auto rows = read_csv(filmed_recording().read("recording/truth.csv"));
+    std::string text = "frame,u_px,v_px,azimuth_deg,elevation_deg,sigma_deg\n";
+    for (std::size_t frame = 30; frame < rows.size(); frame += 10) {
+      FrameOrientation is;
+      is.mode = OrientationMode::kPt;
+      is.calibration = truth;
+      is.angle = {std::stod(rows[frame].at("pan_rad")), std::stod(rows[frame].at("tilt_rad"))};
+      // Row 0 is exposed when the angles hold.
+      for (const double u : {40.5, 440.5}) {
+        Vector3<double> d;
+        EXPECT_EQ(is.direction({u, 0}, &d), ProjectionStatus::kOk);
+        const double azimuth = std::atan2(d.y(), d.x()) * 180 / kPi;
+        const double elevation = std::asin(-d.z()) * 180 / kPi;
+        text += std::to_string(frame) + "," + std::to_string(u) + ",0," +
+                std::to_string(azimuth + yaw_deg) + "," + std::to_string(elevation) + ",0.0005\n";
+      }
+    }
+    return directory_.write("known.csv", text);
+  }
+
   std::string copy_of_recording() {
     fs::copy(recording(), directory_.path() + "/copy", fs::copy_options::recursive);
     return directory_.path() + "/copy";
@@ -79,6 +107,70 @@ TEST_F(VerifyTest, AWrongClockOffsetIsContradictedAndNamed) {
   const Result result = verify(recording(), changed("value: -0.0844", "value: -0.0744"));
   ASSERT_EQ(result.exit_code, 1) << result.output << result.errors;
   EXPECT_THAT(result.output, HasSubstr("likeliest cause: clock offset (off by -"));
+}
+
+TEST_F(VerifyTest, KnownDirectionsThatAgreeHold) {
+  const Result result =
+      verify(recording(), recording() + "/truth.yaml", {"--known", known(0), "--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.output << result.errors;
+  const auto json = nlohmann::json::parse(result.output);
+  ASSERT_EQ(json["known"].size(), 2U);
+  EXPECT_EQ(json["known"][0]["mode"], "OE");
+  for (const auto& each : json["known"]) {
+    EXPECT_EQ(each["verdict"], "holds") << each;
+    EXPECT_GE(each["directions"], 10) << each;
+    EXPECT_EQ(each["offsets"].size(), each["directions"]);
+    // OE mode's sigma is 0.2 px here, PT mode's 1.4.
+    EXPECT_LT(each["rms_px"].get<double>(), 3 * each["claimed_px"].get<double>()) << each;
+    EXPECT_LT(each["claimed_px"], each["mode"] == "OE" ? 0.5 : 2) << each;
+  }
+  EXPECT_THAT(json["sentence"], HasSubstr("known directions, "));
+  EXPECT_THAT(directory_.read("out/verification.html"), HasSubstr("Known directions"));
+}
+
+TEST_F(VerifyTest, APlatformThatWasSurveyedTurnedIsContradictedAndTheTurnSaid) {
+  const Result result = verify(recording(), recording() + "/truth.yaml", {"--known", known(0.2)});
+  ASSERT_EQ(result.exit_code, 1) << result.output << result.errors;
+  EXPECT_THAT(result.output, HasSubstr("contradicted: known directions, "));
+  EXPECT_THAT(
+      result.output,
+      ContainsRegex("they agree with the platform's heading 0\\.(19[6-9]|20[0-4]).* deg: is the "
+                    "platform where the survey has it"));
+}
+
+TEST_F(VerifyTest, AHeadingThatIsNotKnownIsEstimated) {
+  const Result result = verify(recording(), recording() + "/truth.yaml",
+                               {"--known", known(123), "--heading-sigma", "free", "--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.output << result.errors;
+  for (const auto& each : nlohmann::json::parse(result.output)["known"]) {
+    EXPECT_EQ(each["verdict"], "holds") << each;
+    const auto sigma = each["turn_sigma_deg"][2].get<double>();
+    EXPECT_NEAR(each["turn_deg"][2].get<double>(), 123, 5 * sigma);
+    EXPECT_LT(sigma, 0.01);
+    EXPECT_EQ(each["turn_sigma_deg"][0], 0);
+  }
+}
+
+TEST_F(VerifyTest, ATurnWithoutKnownDirectionsIsRefused) {
+  const Result result =
+      verify(recording(), recording() + "/truth.yaml", {"--heading-sigma", "free"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.errors, HasSubstr("--known"));
+  EXPECT_EQ(verify(recording(), recording() + "/truth.yaml",
+                   {"--known", known(0), "--level-sigma", "loose"})
+                .exit_code,
+            2);
+}
+
+TEST_F(VerifyTest, KnownDirectionsOfNoFrameAreRefused) {
+  const std::string file = directory_.write("known.csv",
+                                            "frame,u_px,v_px,azimuth_deg,elevation_deg,sigma_deg\n"
+                                            "999,10,20,0,0,0.01\n");
+  const Result result = verify(recording(), recording() + "/truth.yaml", {"--known", file});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(
+      last_line(result.errors),
+      HasSubstr("known.csv:2: frame 999 is not in the recording, whose frames are 0 to 99"));
 }
 
 TEST_F(VerifyTest, WhatCannotBeJudgedEndsWithTwo) {

@@ -26,6 +26,8 @@ struct PlaceErrors {
   double pan_gear_rad = 0;   // telemetry minus truth: times the sine of 3 periods over the range
   double tilt_play_rad = 0;  // b of an encoder on the motor
   double growth = 1;         // of the frames' errors against their covariance
+  // Each other frame is taken at 1.2 times f, whose calibration has errors of its own, larger ones.
+  bool two_zooms = false;
 };
 
 inline Calibration verified_calibration() {
@@ -75,17 +77,29 @@ inline SeenPlaces see_places(std::uint64_t seed, const PlaceErrors& errors) {
   std::normal_distribution<double> normal;
   SeenPlaces out;
   out.calibration = verified_calibration();
-  Eigen::Matrix<double, kParameterCount, 1> off = errors.parameters;
-  for (int i = 0; i < kParameterCount; ++i)
-    off[i] += std::sqrt(out.calibration.covariance(i, i)) * normal(generator);
-  const Calibration truth = moved(out.calibration, off);
+  const auto draw_errors = [&](const Calibration& calibration) {
+    Eigen::Matrix<double, kParameterCount, 1> off = errors.parameters;
+    for (int i = 0; i < kParameterCount; ++i)
+      off[i] += std::sqrt(calibration.covariance(i, i)) * normal(generator);
+    return off;
+  };
+  std::vector<Calibration> calibrations = {out.calibration};
+  std::vector<Eigen::Matrix<double, kParameterCount, 1>> offs = {draw_errors(out.calibration)};
+  if (errors.two_zooms) {
+    Calibration other = out.calibration;
+    other.camera.focal_length *= 1.2;
+    other.covariance(index(Parameter::kFocalLength), index(Parameter::kFocalLength)) = 16 * 16;
+    calibrations.push_back(other);
+    offs.push_back(draw_errors(other));
+  }
 
   std::vector<FrameOrientation> true_frames;
   for (int i = 0; i < kFrames; ++i) {
     const double t = i * 0.25;
+    const std::size_t zoom = static_cast<std::size_t>(i) % calibrations.size();
     FrameOrientation is;
     is.mode = OrientationMode::kPt;
-    is.calibration = truth;
+    is.calibration = moved(calibrations[zoom], offs[zoom]);
     is.angle = {kReach_rad * std::sin(1.1 * t), 0.6 * kReach_rad * std::sin(1.7 * t + 1)};
     is.rate = {1.1 * kReach_rad * std::cos(1.1 * t), 1.02 * kReach_rad * std::cos(1.7 * t + 1)};
     true_frames.push_back(is);
@@ -95,11 +109,11 @@ inline SeenPlaces see_places(std::uint64_t seed, const PlaceErrors& errors) {
     frame.heading = {is.rate.pan > 0 ? 1.0 : -1.0, is.rate.tilt > 0 ? 1.0 : -1.0};
     FrameOrientation& seen = frame.by_all_samples;
     seen = is;
-    seen.calibration = out.calibration;
+    seen.calibration = calibrations[zoom];
     seen.motion_covariance.diagonal().head<2>().setConstant(kAngle_rad * kAngle_rad);
     seen.motion_covariance.diagonal().segment<2>(2).setConstant(kRate_rad_s * kRate_rad_s);
-    seen.motion_sensitivity = telemetry_sensitivity(out.calibration.mechanics, is.motion());
-    const Eigen::Matrix<double, 6, 1> by_parameters = seen.motion_sensitivity * off;
+    seen.motion_sensitivity = telemetry_sensitivity(seen.calibration.mechanics, is.motion());
+    const Eigen::Matrix<double, 6, 1> by_parameters = seen.motion_sensitivity * offs[zoom];
     seen.angle.pan -= by_parameters[0] + errors.growth * kAngle_rad * normal(generator);
     seen.angle.tilt -= by_parameters[1] + errors.growth * kAngle_rad * normal(generator);
     seen.rate.pan -= by_parameters[2] + errors.growth * kRate_rad_s * normal(generator);
