@@ -41,7 +41,7 @@ double median_error(const std::vector<LinearisedResidual>& residuals) {
 
 // Landmarks that are to be left out, with their observations.
 int leave_out(const std::vector<char>& out, SelectedInput* selected,
-              std::vector<AdjustmentState*> states) {
+              const std::vector<AdjustmentState*>& states) {
   AdjustmentData& data = selected->data;
   std::vector<int> number(out.size(), 0);
   int kept = 0;

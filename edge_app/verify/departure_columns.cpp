@@ -22,6 +22,7 @@ double hat(double x, const std::vector<double>& knots, std::size_t k) {
 
 std::vector<double> knots_over(double low, double high, int count) {
   std::vector<double> out;
+  out.reserve(static_cast<std::size_t>(count));
   for (int i = 0; i < count; ++i) out.push_back(low + (high - low) * i / (count - 1));
   return out;
 }
@@ -50,6 +51,7 @@ DepartureColumns curve(Departure departure, FrameColumn::What what, double sign,
   }
   if (!(high - low > kLeastRange)) return out;
   std::vector<double> x;
+  x.reserve(frames.size());
   for (const SeenFrame& frame : frames) x.push_back(value_of(frame));
   out.at = knots_over(low, high, knots);
   for (std::size_t k = 0; k < out.at.size(); ++k) {

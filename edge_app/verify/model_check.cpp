@@ -387,6 +387,7 @@ std::vector<std::size_t> best_of(const std::vector<std::size_t>& found, double l
                                  PairEquations* equations) {
   equations->set_free({});
   std::vector<double> price;
+  price.reserve(found.size());
   for (const std::size_t d : found)
     price.push_back(chi_square_limit(std::max(1, equations->test(d).freedom), log_limit));
   std::vector<std::size_t> best = found;

@@ -153,6 +153,7 @@ void leave_out_strays(const std::vector<SoughtPlace>& sought, PlacePair* pair,
   if (off.empty()) return;
   const Vector2<double> middle = median_of(off);
   std::vector<double> away;
+  away.reserve(off.size());
   for (const Vector2<double>& each : off) away.push_back((each - middle).norm());
   // Of a Rayleigh distribution the median is 1.18 sigma.
   const double limit = std::max(kNoOutlier_px, kOutlierSpreads * median_of(away) / 1.18);
