@@ -10,7 +10,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   std::string error;
   if (!parse_vapix_position(text_of(data, size), &position, &error)) {
     FUZZ_REQUIRE(is_one_line(error));
-    FUZZ_REQUIRE(error.size() < 200);
+    FUZZ_REQUIRE(error.size() < longest_error(120));
     return 0;
   }
   FUZZ_REQUIRE(error.empty());
