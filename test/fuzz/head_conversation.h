@@ -11,7 +11,7 @@ namespace alidade {
 inline void require_sound(const Answer& answer, std::string_view bytes) {
   FUZZ_REQUIRE(answer.kind == Answer::Kind::kNone || answer.begin < bytes.size());
   FUZZ_REQUIRE(answer.problem.empty() || is_one_line(answer.problem));
-  FUZZ_REQUIRE(answer.problem.size() < 200);
+  FUZZ_REQUIRE(answer.problem.size() < longest_error(120));
   switch (answer.kind) {
     case Answer::Kind::kNone:
     case Answer::Kind::kDone:
