@@ -44,6 +44,11 @@ double hops(double t) {
   return back ? 0.39 - there : there;
 }
 
+// Moves all the time.
+PanTilt<double> figure(double t) {
+  return {0.06 * std::sin(0.5 * t + 1), 0.03 * std::sin(0.9 * t + 2)};
+}
+
 struct Link {
   double delay_s = 0;  // telemetry against pictures
   double samples_hz = 25;
@@ -52,6 +57,7 @@ struct Link {
   double step = 0;             // rad
   double gear = 0;             // rad
   double noise = kAngleNoise;  // rad
+  double error_sigma = 0;      // rad, that the gear is known to have
   double change_s = 1e9;       // when the delay becomes changed_s
   double changed_s = 0;
 };
@@ -101,7 +107,7 @@ struct Ride {
       last.tilt = reading(at.tilt);
     }
     last.time_s = now_s + phase;
-    delay.add(last);
+    delay.add(last, Vector2<double>::Constant(link.error_sigma * link.error_sigma));
   }
   void frame() {
     next_frame_s += 1 / link.frames_hz;
@@ -179,6 +185,49 @@ INSTANTIATE_TEST_SUITE_P(
                               })},
                     DelayCase{"Gear", sines, with([](Link* l) { l->gear = 2e-4; })}),
     [](const auto& one) { return one.param.name; });
+
+// The first pictures show a camera that moves already: what came before them is not known.
+TEST(LinkDelay, IsFoundWithinTwoSecondsOfTheFirstPicturesOfACameraThatMoves) {
+  constexpr double kKnownGear = 4e-5;
+  constexpr int kRides = 12;
+  for (const double error_sigma : {0.0, kKnownGear}) {
+    double squares = 0;
+    int count = 0;
+    for (const double delay_s : {-0.4, -0.3, -0.085, -0.02, 0.0, 0.02, 0.085, 0.3, 0.4}) {
+      for (unsigned seed = 1; seed <= kRides; ++seed) {
+        LinkDelay delay(kAngleNoise / 4, kConnections_s);
+        delay.open();
+        Link link;
+        link.delay_s = delay_s;
+        link.noise = kAngleNoise / 4;
+        link.error_sigma = error_sigma;
+        link.gear = std::sqrt(2.0) * error_sigma;
+        const double from_s = 0.7 * seed;
+        Ride run(&delay, [from_s](double t) { return figure(from_s + t); }, link, seed);
+        run.go(2);
+        ASSERT_EQ(delay.state(), LinkDelayState::kFound) << delay_s << " " << seed;
+        EXPECT_LT(std::abs(run.error()), 5 * delay.sigma_s()) << delay_s << " " << seed;
+        squares += std::pow(run.error() / delay.sigma_s(), 2);
+        ++count;
+      }
+    }
+    EXPECT_LT(squares / count, 1.3) << error_sigma;
+    EXPECT_GT(squares / count, 0.1) << error_sigma;
+  }
+}
+
+// An error of the angles that is as large as what the delay changes tells nothing of it.
+TEST(LinkDelay, IsNotToldThroughAnErrorOfTheAnglesThatIsLarger) {
+  LinkDelay delay(kAngleNoise, kConnections_s);
+  delay.open();
+  Link link;
+  link.delay_s = 0.02;
+  link.gear = 2e-3;
+  link.error_sigma = 2e-3;
+  Ride run(&delay, figure, link, 1);
+  run.go(20);
+  EXPECT_EQ(delay.state(), LinkDelayState::kOpen);
+}
 
 TEST(LinkDelay, IsNotToldByRestNorByAConstantRate) {
   for (const double rate : {0.0, 1e-6, 0.05, 0.4}) {
