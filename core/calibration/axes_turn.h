@@ -1,8 +1,8 @@
 #pragma once
 // axes_turn(): what two calibrations' covariances need before they are added. The axes' errors are
 // told in the tangent basis of each calibration's own axes (Parameter), and that basis jumps where
-// another coordinate axis becomes the least aligned one (direction.h). Axes that are nearly those of
-// the base are next to such a jump: two estimates of one head may lie on either side of it.
+// another coordinate axis becomes the least aligned one (direction.h). Axes that are nearly the
+// base's are next to such a jump: two estimates of one head may lie on either side of it.
 // Pure; no allocation.
 
 #include "core/model/calibration.h"

@@ -1,10 +1,12 @@
 #pragma once
 // Shimmer: how far points of the pictures move against the common motion of their picture, as
-// through haze. No calibration is needed: between two frames a fraction of a second apart any camera
-// that turns, whatever its lens, shifts its points by a smooth function of their place; a polynomial
-// of second order is taken from the displacements.
+// through haze. No calibration is needed. Between two frames a fraction of a second apart any
+// camera that turns, whatever its lens, shifts its points by a smooth function of their place; a
+// polynomial of second order is taken from the displacements.
 // Haze comes back: what it moves in a short and in a long time is the same. What drifts or lies
 // nearer than the rest moves on. Allocates.
+
+#include <string>
 
 #include "core/calibration/linearisation.h"
 
@@ -20,5 +22,9 @@ struct Shimmer {
 };
 
 [[nodiscard]] Shimmer find_shimmer(const AdjustmentData& data);
+
+// How a refusal goes on where the pictures shimmer as through haze; else empty. sigma_ratio: the
+// observations' sigmas over what the tracks stated.
+[[nodiscard]] std::string haze_text(const AdjustmentData& data, double sigma_ratio);
 
 }  // namespace alidade::internal

@@ -71,7 +71,6 @@ class StagedAdjustment {
   void replace_rounded_telemetry();
   bool mark_outliers();
   bool correct_noise(CalibrationQuality* quality);
-  [[nodiscard]] std::string haze_text(const CalibrationQuality& quality) const;
   [[nodiscard]] bool hold_centre();
   void release_centre();
   [[nodiscard]] StageStatus allow_for_repetition(CalibrationQuality* quality);
