@@ -38,9 +38,9 @@ struct CalibrationNotes {
 //   focal_length: {value: 32008, sigma: 24}         and likewise every parameter
 //   pan_axis: {value: [0, 0, 1], sigma: [0, 0]}     unit vector; sigma in rad, in tangent_basis
 //   centre_offset: {value: [0, 0], sigma: [0, 0]}   optional: px, optical centre - image's middle
-//   zoom: 1234                                      optional
+//   zoom: 1234                                      optional; needed beside zoom_curve
 //   covariance: {names: [...], matrix: [[...]]}     optional; must agree with the sigmas to 0.1 %
-//   zoom_curve: {...}                               optional, needs zoom: others, zoom_text.h
+//   zoom_curve: {...}                               optional: other readings, zoom_text.h
 //   pan_error, pan_play_rad ...: {...}              optional: telemetry_error_text.h
 //   pupil_m: {value: [0, 0, 0.06], sigma: [...]}    optional: pupil.h; right, down, forward
 //   far_focal_length: {value: 10660, sigma: 4}      optional: px, of far things

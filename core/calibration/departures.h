@@ -5,11 +5,11 @@
 //               (one axis late)
 //   pictures    focal length that drifts, r^5 distortion, optical centre (if it is exact), lag at
 //               speed, parallax (a pupil off the axes, and depth), part of the scene that drifts
-// First comes the cause that chance would show least. The next one is found with the first one's
-// unknowns free, and so on, up to four; different distances (depth_spread.h) are tested separately.
-// False alarms: 1 % for all causes together. Beside any cause r^5 distortion is possible, too, as
-// far as lenses have it and the residuals do not exclude it.
-// Allocates. Derivation: docs/calibration.md.
+// The cause whose chi-square is least probable by chance comes first. The next one is found with
+// the first one's unknowns free, and so on, up to four; different distances (depth_spread.h) are
+// tested separately. False alarms: 1 % for all causes together. Beside any cause r^5 distortion is
+// possible, too, as far as lenses have it and the residuals do not exclude it. Allocates.
+// Derivation: docs/calibration.md.
 
 #include <vector>
 
@@ -28,7 +28,7 @@ struct Departures {
   GlobalMatrix hidden = GlobalMatrix::Zero();
   DepthSpread depth;                // of different distances
   bool depth_is_shown = false;      // beyond chance; its effect is not in `error`
-  bool depth_is_likeliest = false;  // chance would show it less than any other cause
+  bool depth_is_likeliest = false;  // less probable by chance than any other cause
 };
 
 // state, at, factor: the minimum of least squares, of which adjustment has the covariance.

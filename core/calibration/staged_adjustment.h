@@ -36,10 +36,11 @@ class StagedAdjustment {
                    SelectedInput* selected);
 
   // Cauchy loss, whose scale follows the medians of the residuals, down to 3 sigmas. Splits
-  // segments of the spline if the residuals ask for it (knot_choice.h). Leaves out what drifts, and
-  // begins anew if anything does (drifting_tracks.h). Then replaces rounded telemetry by its
-  // crossings (rounded_telemetry.h), which need a trajectory that is already close. Subtracts the
-  // departures that telemetry shows (telemetry_departures.h). Marks outliers at the end.
+  // segments of the spline if the residuals ask for it (knot_choice.h). Leaves out what drifts
+  // (drifting_tracks.h). Begins anew if anything does, and to add nearness. Then replaces rounded
+  // telemetry by its crossings (rounded_telemetry.h), which need a trajectory that is already
+  // close. Subtracts the departures that telemetry shows (telemetry_departures.h). Marks outliers
+  // at the end.
   void adjust_robustly();
 
   // After adjust_robustly(). Least squares on the rest, as a robust loss on good data would inflate
