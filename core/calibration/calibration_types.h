@@ -182,8 +182,7 @@ struct FrameResult {
 };
 
 // Seen minus projected (A^-1 e of linearisation.h). Its standard deviation is the observation's
-// sigma_px if the stated noise is right. Of an outlier without a projection error_px has no
-// meaning.
+// sigma_px if the stated noise is right. An outlier without a projection has none.
 struct ObservationResidual {
   std::size_t observation = 0;  // index into the input
   Vector2<double> error_px;

@@ -373,17 +373,18 @@ StageStatus StagedAdjustment::allow_for_repetition(CalibrationQuality* quality) 
   quality->repetition =
       std::max(1.0, repetition(data, adjusted_.state.landmarks.size(), adjusted_.at));
   if (quality->repetition < kChance) return {};
-  for (auto& o : data.observations) o.sigma *= std::sqrt(quality->repetition);
+  const double wider = std::sqrt(quality->repetition);
+  for (auto& o : data.observations) o.sigma *= wider;
   if (!adjustment_.minimise({}, 20, 1e-4, &adjusted_.state, &adjusted_.at) ||
       !adjustment_.covariance(adjusted_.at, &adjusted_.covariance, &telemetry_unknowns_)) {
     return {CalibrationStatus::kNotConverged,
             "the adjustment does not converge with errors that repeat from frame to frame" +
-                haze_text(selected_->data, quality->pixel_sigma_ratio)};
+                haze_text(data, quality->pixel_sigma_ratio * wider)};
   }
   if (departs_ && !settle_known_departures()) {
     return {CalibrationStatus::kNotConverged,
             "the adjustment does not converge with the telemetry's errors" +
-                haze_text(selected_->data, quality->pixel_sigma_ratio)};
+                haze_text(data, quality->pixel_sigma_ratio * wider)};
   }
   return {};
 }
