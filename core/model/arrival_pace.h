@@ -34,8 +34,8 @@ class ArrivalPace {
     greatest_s_ = -std::numeric_limits<double>::infinity();
   }
 
-  // Values must be finite. An overtaken item is ignored. An item far back is of another clock and
-  // restarts the judgement.
+  // Values must be finite. An item whose stamp is not later than the last one's is ignored. If it
+  // is earlier by kOvertaken_s or more, it is of another clock: the judgement begins anew with it.
   void add(double receive_s, double sender_s) {
     if (size_ > 0 && !(sender_s > item(size_ - 1).sender_s)) {
       if (sender_s > item(size_ - 1).sender_s - kOvertaken_s) return;
@@ -84,7 +84,7 @@ class ArrivalPace {
     return greatest_s_ > least_s + longer_s;
   }
 
-  // The latest items, oldest first; s.
+  // The latest items, 128 at most, oldest first; s.
   [[nodiscard]] std::size_t size() const { return size_; }
   [[nodiscard]] double receive_s(std::size_t i) const { return item(i).receive_s; }
   [[nodiscard]] double sender_s(std::size_t i) const { return item(i).sender_s; }
