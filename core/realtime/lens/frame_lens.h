@@ -13,7 +13,7 @@ struct FrameLens {
   Calibration calibration;
   double rate = 0;        // 1/s, d log f / dt
   double rate_sigma = 0;  // 1/s
-  // False: as far as readings show, the lens has not moved since the previous frame.
+  // False: as far as the readings around the frame's time show, the lens is at rest.
   bool moves = false;
   // Slopes along the curve: change of the distortion in the corner (1) and of the optical centre
   // (px) per unit of log f. With them distortion and centre follow from the reading's log f to the

@@ -20,12 +20,13 @@ class TelemetryCorrection {
                       double noise_rad);
 
   [[nodiscard]] bool exists() const { return exists_; }
-  // Values that are not finite stay as they are. A sample older than an earlier one does not move
-  // the state of the play.
+  // A sample with an angle that is not finite stays as it is. A sample older than an earlier one
+  // does not move the state of the play.
   void correct(TelemetrySample* sample);
   // Samples were lost, or the head was switched off.
   void forget_state();
-  // Adds the variance of the remaining error to the covariance.
+  // Adds the variance of the remaining error to the covariance, and sets error_variance and
+  // error_length: 0 if nothing is corrected.
   void add_left(InterpolatedPanTilt* measured) const;
 
  private:
