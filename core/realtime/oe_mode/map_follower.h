@@ -26,6 +26,7 @@ class MapFollower {
   // The map begins anew.
   void begin_map() { lines_ = {}; }
 
+  // Ignored if not finite, or without variance.
   void note(const SeenOffset& seen);
   // Something was seen to move. rate: rad/s.
   void note_moving(double time_s, double rate);
@@ -33,7 +34,8 @@ class MapFollower {
   // The map was moved, so that its offset is larger by this.
   void move_offset(const Vector2<double>& by);
 
-  // False if nothing was seen to move lately, or the map is too new. pixel: rad.
+  // False if nothing was seen to move lately, or the map is too new; *out is then not to be used.
+  // pixel: rad, the angle of one pixel.
   [[nodiscard]] bool follow(double time_s, double pixel, FollowedOffset* out) const;
 
  private:

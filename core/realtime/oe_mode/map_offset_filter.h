@@ -113,6 +113,8 @@ class MapOffsetFilter {
     return variance_inflation(options_.shared_correlation_time_s,
                               frame_time_s - scale_learnt_time_s_);
   }
+  // Learns phi from the scale of a frame's landmarks: SolvedLens::measured, information and
+  // measured_sensitivity. Does nothing if phi is not learnt, or without information.
   void learn_scale(double frame_time_s, double measurement, double information,
                    const Sensitivity<1>& sensitivity);
   // Adds an independent error of the map's scale. by: variance.
@@ -142,7 +144,8 @@ class MapOffsetFilter {
   // covariance of that answer.
   void begin(double frame_time_s, const Matrix2<double>& angle_covariance, bool extrapolated,
              const AngleError& error = {});
-  // A frame was answered with telemetry that was not extrapolated. False if nothing was learnt.
+  // A frame was answered with telemetry that was not extrapolated. False if the innovation is
+  // beyond max_contradiction: the offset then stays, and the cells keep what was seen.
   bool learn(double frame_time_s, const OffsetInnovation& innovation);
   // True once for each frame that was learnt from, or that telemetry contradicted.
   [[nodiscard]] bool take_seen(SeenOffset* out);

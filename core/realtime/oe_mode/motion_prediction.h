@@ -1,10 +1,11 @@
 #pragma once
 // MotionPrediction: the camera's motion in a frame before its image is used, from telemetry or,
 // without it, from the previous frame.
-// From telemetry: its angles and rates in true units, minus the map's offset. From the previous
-// frame: its angle and rate, extrapolated. The covariance then allows for an acceleration, whose
-// sigma is the smaller of acceleration_fields and InterpolatedPanTilt::acceleration_sigma. No
-// allocation. One thread.
+// From telemetry: its angles and rates in true units, minus the map's offset, and its acceleration
+// if InterpolatedPanTilt::acceleration_sigma is below acceleration_fields. From the previous frame:
+// its angle and rate, extrapolated. The covariance allows for an error of the acceleration: with
+// the smaller of these two sigmas, after a previous frame with acceleration_fields. No allocation.
+// One thread.
 
 #include "core/model/calibration.h"
 #include "core/model/rolling_shutter.h"

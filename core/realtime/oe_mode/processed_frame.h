@@ -45,7 +45,7 @@ struct ProcessedFrame {
   double inflation = 1;  // of the landmarks' covariances, from their residuals
   OwnLens lens;
   bool solved = false;  // landmarks agreed with each other, whatever telemetry said
-  const MovingDirections* moving = nullptr;  // where no landmark is made; null: everywhere
+  const MovingDirections* moving = nullptr;  // where no landmark is made; null: no such place
 };
 
 }  // namespace alidade

@@ -52,9 +52,10 @@ class SceneDrift {
   void note(const SeenOffset& seen);
   // Begins a frame in which landmarks held. rate: rad/s, the camera's.
   void begin_frame(double time_s, const Vector2<double>& rate);
-  // d: unit, where it was found, in the map's frame.
+  // d: unit, where it was found, in the map's frame. Ignored if it looks steeper than 1.4 rad, or
+  // beyond kMaxFoundLandmarks of a frame.
   void note_landmark(int slot, std::uint32_t id, const Vector3<double>& d);
-  // Of that frame. pixel: rad.
+  // The verdict on that frame. pixel: rad, the angle of one pixel.
   SceneVerdict judge(double pixel);
 
   // By the latest verdict. A withheld answer is telemetry's.
@@ -64,7 +65,7 @@ class SceneDrift {
   // rad^2, of (pan, tilt): by how much the map may have drifted along without anything being
   // shown yet.
   [[nodiscard]] const Matrix2<double>& doubt() const { return doubt_; }
-  // Whether that is by less than a second of telemetry, so that its noise alone often shows some.
+  // True if doubt() is from less than a second of telemetry: its noise alone then often gives some.
   [[nodiscard]] bool is_young() const;
 
   // The frame's landmarks that move, by the latest verdict: calls use(slot, id, d, rate).
