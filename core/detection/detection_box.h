@@ -17,7 +17,7 @@ struct DetectionBox {
   double score = 1;   // larger is surer; the scale is the detector's; another program's is 0 to 1
   std::string name;   // class; empty: unknown; its length is limited where boxes come in
 
-  // px: the middle of the lower edge; the middle of the box.
+  // px; foot(): the middle of the lower edge.
   [[nodiscard]] Vector2<double> foot() const { return {u + width / 2, v + height}; }
   [[nodiscard]] Vector2<double> middle() const { return {u + width / 2, v + height / 2}; }
 };

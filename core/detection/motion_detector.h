@@ -36,6 +36,7 @@ struct MotionOptions {
   double most_changed = 0.1;   // of the picture
   ChangeOptions change;
 
+  // False if a value is invalid. *error, if not null, then says which in one line.
   [[nodiscard]] bool validate(const char** error = nullptr) const;
 };
 
@@ -58,7 +59,7 @@ struct MotionAnswer {
   double covered = 0;   // share of the picture in which motion can be found
   double shift_px = 0;  // largest error of the compared pictures' orientations
   double spread = 0;    // largest spread of differences over the expected one; 1: as expected
-  double changed = 0;   // share of the picture
+  double changed = 0;   // share of the picture beyond the threshold (ChangeRegions::changed())
 };
 
 class MotionDetector {

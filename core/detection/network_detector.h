@@ -25,13 +25,14 @@ struct NetworkOptions {
   int most_boxes = 64;              // the surest
   std::vector<std::string> labels;  // of classes 0, 1, ...; empty: numbers are used
 
+  // False if a value is invalid. *error, if not null, then says which in one line.
   [[nodiscard]] bool validate(const char** error = nullptr) const;
 };
 
 enum class NetworkStatus {
   kOk,
-  kNoImage,  // not valid
-  kFailed    // the network's output has changed since the start
+  kNoImage,  // not valid, or stored bottom up
+  kFailed    // OpenCV could not run the network, or its output has another shape than at first
 };
 
 class NetworkDetector {
@@ -50,7 +51,7 @@ class NetworkDetector {
   NetworkDetector& operator=(const NetworkDetector&) = delete;
 
   [[nodiscard]] NetworkStatus find(const ImageView& image);
-  // Of the latest picture, surest first.
+  // Of the latest picture, surest first; empty unless its status was kOk.
   [[nodiscard]] const std::vector<DetectionBox>& boxes() const { return boxes_; }
   [[nodiscard]] int classes() const;
 
