@@ -66,7 +66,7 @@ struct MapOptions {
 
 enum class MapStatus {
   kOk,
-  kBadInput,       // indices or numbers out of range; no picture
+  kBadInput,       // indices, numbers or options out of range; no picture or no landmark
   kNotConnected,   // see groups
   kNotDetermined,  // singular
   kNotConverged,
