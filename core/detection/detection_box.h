@@ -1,7 +1,7 @@
 #pragma once
 // DetectionBox: a detection in an image, found by this folder or by another program: its smallest
-// upright rectangle and its score. Pixels as in CONVENTIONS.md: the box spans [u, u + width] x
-// [v, v + height]. The box around the top-left pixel alone is (0, 0, 1, 1).
+// upright rectangle and its score. Pixels as in CONVENTIONS.md: the box spans [u, u + width] x [v,
+// v + height]. The box around the top-left pixel alone is (0, 0, 1, 1).
 
 #include <string>
 

@@ -43,7 +43,7 @@ struct MotionOptions {
 enum class MotionStatus {
   kOk,
   kWrongImage,     // no picture, or its size is not that of options and calibration
-  kNoOrientation,  // mode none, or its numbers are not finite or describe no camera
+  kNoOrientation,  // mode none, numbers not finite or of no camera, or pixels without a direction
   kNotNewer,       // not newer than the picture before
   kBlurred,        // the camera turns too fast for the exposure
   // Too little of the image was seen before: at the beginning, after a jump or a change of zoom.

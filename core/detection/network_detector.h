@@ -37,12 +37,11 @@ enum class NetworkStatus {
 
 class NetworkDetector {
  public:
-  // model: the bytes of a file. options must be valid. Runs once on an empty image. N tells the
-  // output's kind: v8 has one candidate for each cell of grids with strides 8, 16 and 32, v5 has
-  // three. With another N, the larger dimension is taken for the candidates, the smaller one for
-  // the values. (An export with NMS, 1 x N x 6, looks like v5's.) Null and one line in *error: not
-  // an ONNX network, another input or output, boxes not in pixels, or a different number of
-  // classes.
+  // model: the bytes of a file. options must be valid. Runs once on an empty image. The output's
+  // kind follows from N: v8 has one candidate for each cell of grids with strides 8, 16 and 32, v5
+  // has three. With another N, the larger dimension is taken for the candidates, the smaller one
+  // for the values. (An export with NMS, 1 x N x 6, looks like v5's.) Null and one line in *error:
+  // not an ONNX network, another input or output, boxes not in pixels, or labels of another number.
   [[nodiscard]] static std::unique_ptr<NetworkDetector> load(const std::string& model,
                                                              const NetworkOptions& options,
                                                              std::string* error);

@@ -4,7 +4,7 @@
 // After a stall (a relay, a network or a process that stood still) items wait and then come faster
 // than they were sent: receive - sender falls until the last waiting item has come. During the fall
 // nobody knows where it will end, so an item's age is unknown. A stream that is late by a constant
-// cannot be told from a network with the same delay.
+// cannot be distinguished from a network with that delay.
 // Fixed memory, trivially copyable, no allocation, no exceptions; one thread. All times are
 // seconds.
 

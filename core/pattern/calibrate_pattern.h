@@ -20,13 +20,13 @@ namespace alidade {
 enum class PatternStatus {
   kOk,
   kBadInput,         // sizes, indices, times or numbers contradict pattern_data.h
-  kNoPattern,        // no frame shows enough of the pattern
-  kTooFewFrames,     // too few show the pattern, or the video is too short
+  kNoPattern,        // no frame shows the pattern
+  kTooFewFrames,     // too few frames show the pattern, or these show too few points of it
   kNoStart,          // the views do not determine a lens, even roughly
-  kNotConverged,     // no curve explains the detections
+  kNotConverged,     // no poses, or no curve, explain the detections
   kFrameRateTooLow,  // the curve cannot follow the motion
-  kNoLineDelay,      // the image hardly moved during the read-out
-  kNoLens,           // the views are too similar
+  kNoLineDelay,      // the pattern or, during the read-out, the image hardly moved
+  kNoLens,           // a focal length is too uncertain: similar views, or a bent pattern
 };
 
 struct PatternCalibrationOptions {

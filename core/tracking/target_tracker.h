@@ -4,8 +4,8 @@
 // frame is put in its place and the frames after it are processed again: the result is that of the
 // right order, and identities stay. A frame with any fault is refused as a whole, with its reason.
 // Identities count from 1 and are never reused. Equal calls give equal results. For one thread. The
-// constructor takes all memory, no call allocates: about max_targets * (300 + 100
-// max_detections) + history_frames * (320 max_targets + 50 max_detections) bytes.
+// constructor takes all memory, no call allocates: about max_targets * (300 + 100 max_detections) +
+// history_frames * (320 max_targets + 50 max_detections) bytes.
 
 #include <cstdint>
 #include <vector>

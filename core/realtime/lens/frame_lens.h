@@ -16,8 +16,8 @@ struct FrameLens {
   // False: as far as the readings around the frame's time show, the lens is at rest.
   bool moves = false;
   // Slopes along the curve: change of the distortion in the corner (1) and of the optical centre
-  // (px) per unit of log f. With them distortion and centre follow from the reading's log f to the
-  // frame's, as a coarse reading is off.
+  // (px) per unit of log f. They carry distortion and centre from the reading's log f to the
+  // frame's, as a coarse reading may be off.
   CornerDistortion<double> corner_by_zoom = CornerDistortion<double>::Zero();
   Vector2<double> centre_by_zoom = Vector2<double>::Zero();
 };

@@ -1,8 +1,7 @@
 #pragma once
-// LensFollower: the lens of each frame once the lens has left the map's. It gives the camera that
-// is expected before landmarks are found, the lens that they show, and the calibration of the
-// answer. follow() begins the following, begin() or give_up() ends it. For each frame, in this
-// order:
+// LensFollower: the lens of each frame once it differs from the map's. It gives the camera that is
+// expected before landmarks are found, the lens that they show, and the calibration of the answer.
+// follow() begins the following, begin() or give_up() ends it. For each frame, in this order:
 //   begin_frame()        takes the zoom reading, if there is one
 //   expect_after_last(), expect_by_reading()   expect a camera; the last call counts
 //   look_through()       sets the camera to find landmarks with

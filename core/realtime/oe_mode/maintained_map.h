@@ -60,7 +60,7 @@ class MaintainedMap {
 
   [[nodiscard]] const LandmarkMap& landmarks() const { return landmarks_; }
   [[nodiscard]] bool empty() const { return landmarks_.size() == 0; }
-  // The shear, as a frame sees it that looks where look_at() said (rad).
+  // The shear as seen by a frame at the tilt (rad) of the last look_at().
   [[nodiscard]] const MapShear& shear() const { return shear_; }
   void look_at(double tilt) { shear_.move_to(tilt); }
   // In the map's cells, of landmarks made at this focal length (px): see LandmarkMap.

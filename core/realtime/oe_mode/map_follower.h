@@ -1,7 +1,7 @@
 #pragma once
-// MapFollower: the map's offset while the map may be going along with what moves. As long as ground
-// and clouds are told apart by seconds of telemetry, a map bends by some tenths of a pixel, and no
-// constant offset holds for it. So for a while after something was seen to move (scene_drift.h) the
+// MapFollower: the map's offset while the map may be going along with what moves. Telemetry takes
+// seconds to show what is ground and what are clouds. Meanwhile a map bends by some tenths of a
+// pixel, and no constant offset holds for it. So for a while after something was seen to move the
 // offset is that of the last half second alone: a straight line through telemetry's angle minus the
 // map's, whose rate may be as large as that of what moves. Fixed memory, no allocation. One thread.
 

@@ -108,7 +108,7 @@ class MapOffsetFilter {
   void begin_lens(const LensScale& lens) { lens_ = lens; }
   [[nodiscard]] const LensScale& lens() const { return lens_; }
   // Factor for the variance of phi as measured from the scale of this frame's landmarks:
-  // neighbouring frames' landmarks say the same for long.
+  // neighbouring frames share landmarks and their errors.
   [[nodiscard]] double scale_inflation(double frame_time_s) const {
     return variance_inflation(options_.shared_correlation_time_s,
                               frame_time_s - scale_learnt_time_s_);
@@ -134,7 +134,8 @@ class MapOffsetFilter {
   void forget_error() {
     for (OffsetAxisCells& cells : cells_) cells.forget_error();
   }
-  // How the cells let telemetry's angles count. noise: rad^2, of the angles without that error.
+  // How telemetry's angles count in a frame, by what the cells know of angles near them. noise:
+  // rad^2, of the angles without that error.
   [[nodiscard]] AngleErrorShare share(const AngleError& error, const Vector2<double>& noise) const;
 
   // elapsed_s has passed, and the offset may have drifted.

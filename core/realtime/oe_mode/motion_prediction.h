@@ -69,8 +69,8 @@ class MotionPrediction {
   // The previous motion, extrapolated with its acceleration. Needs follows(frame_time_s).
   [[nodiscard]] FrameMotion<double> last_carried_on(double frame_time_s) const;
 
-  // rad, of an angle of last_carried_on(): what an acceleration may have changed. Infinite if
-  // there is no frame to carry on.
+  // rad, of an angle of last_carried_on(): what an acceleration may have changed. Infinite unless
+  // follows(frame_time_s).
   [[nodiscard]] double carried_on_sigma(double frame_time_s) const;
 
   // covariance: of motion, from the frame's own noise. shared_covariance: rad^2, of its angles,

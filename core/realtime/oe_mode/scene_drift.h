@@ -62,8 +62,8 @@ class SceneDrift {
   [[nodiscard]] bool withholds() const { return on_trial_ || verdict_ == SceneVerdict::kUndecided; }
   // A new map has to prove itself, as what was in view before moved.
   [[nodiscard]] bool is_on_trial() const { return on_trial_; }
-  // rad^2, of (pan, tilt): by how much the map may have drifted along without anything being
-  // shown yet.
+  // rad^2, of (pan, tilt): by how much the map may have drifted along with what moves, although no
+  // verdict says so yet.
   [[nodiscard]] const Matrix2<double>& doubt() const { return doubt_; }
   // True if doubt() is from less than a second of telemetry: its noise alone then often gives some.
   [[nodiscard]] bool is_young() const;
