@@ -52,8 +52,8 @@ class SceneDrift {
   void note(const SeenOffset& seen);
   // Begins a frame in which landmarks held. rate: rad/s, the camera's.
   void begin_frame(double time_s, const Vector2<double>& rate);
-  // d: unit, where it was found, in the map's frame. Ignored if it looks steeper than 1.4 rad, or
-  // beyond kMaxFoundLandmarks of a frame.
+  // d: unit, where it was found, in the map's frame. Ignored at elevations beyond +-1.4 rad, and
+  // beyond kMaxFoundLandmarks landmarks of a frame.
   void note_landmark(int slot, std::uint32_t id, const Vector3<double>& d);
   // The verdict on that frame. pixel: rad, the angle of one pixel.
   SceneVerdict judge(double pixel);
