@@ -38,7 +38,7 @@ enum class OrientationMode {
   return "unknown mode";
 }
 
-// Order: pan, tilt, pan rate, tilt rate, pan acceleration, tilt acceleration.
+// Order: pan, tilt, pan rate, tilt rate, pan acceleration, tilt acceleration; rad, rad/s, rad/s^2.
 using MotionCovariance = Matrix<double, 6, 6>;
 
 struct FrameOrientation {

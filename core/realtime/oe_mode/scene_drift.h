@@ -88,7 +88,8 @@ class SceneDrift {
   [[nodiscard]] std::size_t memory_bytes() const { return records_.capacity() * sizeof(Record); }
 
  private:
-  // Sums for a straight line through what was seen, older values count less.
+  // Sums for a straight line of y over t; older values count less. t: s since first_s. y: rad, the
+  // change of place since then, with the opposite sign.
   struct Record {
     std::uint32_t id = 0;
     Vector2<double> first = Vector2<double>::Zero();  // rad, azimuth and elevation
@@ -105,15 +106,15 @@ class SceneDrift {
     int slot = 0;
     std::uint32_t id = 0;
     Vector3<double> d = Vector3<double>::Zero();
-    bool tested = false;
-    bool apart = false;
-    Vector2<double> rate = Vector2<double>::Zero();
-    double variance = 0;
+    bool tested = false;                             // seen long enough for a rate
+    bool apart = false;                              // of the group that the map does not follow
+    Vector2<double> rate = Vector2<double>::Zero();  // rad/s
+    double variance = 0;                             // (rad/s)^2
     double life_s = 0;
   };
   struct Rate {
-    Vector2<double> value = Vector2<double>::Zero();
-    Vector2<double> variance = Vector2<double>::Zero();
+    Vector2<double> value = Vector2<double>::Zero();     // rad/s
+    Vector2<double> variance = Vector2<double>::Zero();  // (rad/s)^2
     double misfit = 0;  // mean square of what is left, 1: its noise
   };
 
@@ -134,8 +135,8 @@ class SceneDrift {
   Vector2<double> begun_angle_ = Vector2<double>::Zero();
   double noted_s_ = 0;
   bool has_offsets_ = false;
-  double time_s_ = 0;  // of the frame
-  double mean_square_rate_ = 0;
+  double time_s_ = 0;            // of the frame
+  double mean_square_rate_ = 0;  // (rad/s)^2, of the camera
   SceneVerdict verdict_ = SceneVerdict::kRest;
   Vector2<double> rate_ = Vector2<double>::Zero();  // against telemetry
   Vector2<double> apart_rate_ = Vector2<double>::Zero();
