@@ -20,7 +20,7 @@
 namespace alidade::internal {
 
 struct DelayStep {
-  double since_s = 0;  // receive time of the first item with the new minimum
+  double since_s = 0;  // receive time; items from here on are known to have the new minimum
   double step_s = 0;   // new minimum delay minus the old one
   double sigma_s = 0;  // of step_s
 };
@@ -51,7 +51,7 @@ class MinimumDelayStep {
   }
 
   void add_late(double receive_s, double residual_s) { late_.add(receive_s, residual_s, false); }
-  // The same item, after add_late(). mean_s: usual mean delay above the line.
+  // The same item, after add_late(). mean_s: usual mean delay above the line, s.
   void suspect(double receive_s, double residual_s, double mean_s) {
     stretch_.add(receive_s, residual_s, std::max(mean_s, resolution_s_));
   }
