@@ -54,7 +54,7 @@ class ChangeRegions {
 
   // Surest first.
   [[nodiscard]] const std::vector<DetectionBox>& boxes() const { return boxes_; }
-  // Share of all pixels beyond the threshold; of the find() before, if there were too many runs.
+  // Share of all pixels beyond the threshold; if there is no room, of those until then.
   [[nodiscard]] double changed() const { return changed_; }
 
   [[nodiscard]] std::size_t memory_bytes() const;

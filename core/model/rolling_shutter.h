@@ -9,7 +9,7 @@
 // search begins at the reference row. If the slope reaches 1 at a row that it tries, or if it does
 // not converge, the status is kNoRow. If the camera refuses the direction at a row that it tries,
 // the status is the camera's.
-// Domain: as camera.h and mechanics.h. Outputs are written with kOk only. No allocation.
+// Domain: as camera.h and mechanics.h. Outputs are of use with kOk only. No allocation.
 
 #include <Eigen/Core>
 #include <cmath>
