@@ -301,8 +301,8 @@ LinkDelay::Told LinkDelay::judge(const BothAxes& sums) const {
         variance > 0 ? std::clamp(axis.lagged[best] / axis.squares[best], 0.0, kMostLagged) : 0.0;
     variance = std::max(angle_sigma_ * angle_sigma_, variance);
     const double common = axis.shared / axis.samples;
-    const double factor = (1 + lagged) / (1 - lagged) +
-                          kShared * most / axis.stretches * common / variance;
+    const double factor =
+        (1 + lagged) / (1 - lagged) + kShared * most / axis.stretches * common / variance;
     for (std::size_t k = 0; k < kCandidates; ++k) {
       const double missing = (most - axis.degrees[k]) / factor;
       q[k] += axis.squares[k] / (factor * variance) + missing - kDoubt * std::sqrt(2 * missing);
@@ -342,8 +342,8 @@ LinkDelay::Told LinkDelay::judge(const BothAxes& sums) const {
   }
   const double variance =
       std::max(2 * kStep_s * kStep_s / curvature * (1 + 2 / freedom), squares / weights);
-  out.sigma_s = std::sqrt(
-      variance + (kCommon * kCommon * angle_sigma_ * angle_sigma_ + shared) / square_rate);
+  out.sigma_s = std::sqrt(variance +
+                          (kCommon * kCommon * angle_sigma_ * angle_sigma_ + shared) / square_rate);
   out.sure = out.sigma_s < kSure_s;
   const double present = delay_s_ / kStep_s + kCentre;
   const double below = std::clamp(std::floor(present), 0.0, kCandidates - 2.0);

@@ -203,7 +203,8 @@ TEST(LinkDelay, IsFoundWithinTwoSecondsOfTheFirstPicturesOfACameraThatMoves) {
         link.error_sigma = error_sigma;
         link.gear = std::sqrt(2.0) * error_sigma;
         const double from_s = 0.7 * seed;
-        Ride run(&delay, [from_s](double t) { return figure(from_s + t); }, link, seed);
+        Ride run(
+            &delay, [from_s](double t) { return figure(from_s + t); }, link, seed);
         run.go(2);
         ASSERT_EQ(delay.state(), LinkDelayState::kFound) << delay_s << " " << seed;
         EXPECT_LT(std::abs(run.error()), 5 * delay.sigma_s()) << delay_s << " " << seed;
