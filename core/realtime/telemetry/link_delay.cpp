@@ -285,7 +285,6 @@ LinkDelay::Told LinkDelay::judge(const BothAxes& sums) const {
   std::array<double, kCandidates> degrees{};  // of freedom
   double freedom = 0;                         // independent residuals
   double square_rate = 0;
-  double shared = 0;  // rad^2
   for (const Sums& axis : sums) {
     const double most = *std::max_element(axis.degrees.begin(), axis.degrees.end());
     if (!(most > 0)) continue;
@@ -300,9 +299,8 @@ LinkDelay::Told LinkDelay::judge(const BothAxes& sums) const {
     const double lagged =
         variance > 0 ? std::clamp(axis.lagged[best] / axis.squares[best], 0.0, kMostLagged) : 0.0;
     variance = std::max(angle_sigma_ * angle_sigma_, variance);
-    const double common = axis.shared / axis.samples;
-    const double factor =
-        (1 + lagged) / (1 - lagged) + kShared * most / axis.stretches * common / variance;
+    const double shared = kShared * most / axis.stretches * axis.shared / axis.samples;
+    const double factor = (1 + lagged) / (1 - lagged) + shared / variance;
     for (std::size_t k = 0; k < kCandidates; ++k) {
       const double missing = (most - axis.degrees[k]) / factor;
       q[k] += axis.squares[k] / (factor * variance) + missing - kDoubt * std::sqrt(2 * missing);
@@ -310,7 +308,6 @@ LinkDelay::Told LinkDelay::judge(const BothAxes& sums) const {
     }
     freedom += axis.degrees[best] / factor;
     square_rate += axis.square_rate / axis.samples;
-    shared = std::max(shared, common / axis.stretches);
   }
   if (!(square_rate > 0)) return out;
   double least = std::numeric_limits<double>::infinity();
@@ -342,8 +339,7 @@ LinkDelay::Told LinkDelay::judge(const BothAxes& sums) const {
   }
   const double variance =
       std::max(2 * kStep_s * kStep_s / curvature * (1 + 2 / freedom), squares / weights);
-  out.sigma_s = std::sqrt(variance +
-                          (kCommon * kCommon * angle_sigma_ * angle_sigma_ + shared) / square_rate);
+  out.sigma_s = std::sqrt(variance + kCommon * kCommon * angle_sigma_ * angle_sigma_ / square_rate);
   out.sure = out.sigma_s < kSure_s;
   const double present = delay_s_ / kStep_s + kCentre;
   const double below = std::clamp(std::floor(present), 0.0, kCandidates - 2.0);
