@@ -55,7 +55,9 @@ inline constexpr int kDetectionStatusCount = static_cast<int>(DetectionStatus::k
 // One word, for metrics.
 [[nodiscard]] const char* label_of(DetectionStatus status);
 
-// Why a box cannot be used. It is left out; the other boxes of the frame count.
+// Why a box cannot be used. It is left out; the other boxes of the frame count. kBadScore: not 0 to
+// 1. kNoSize: width or height not above 0. kTooLarge: more than twice the picture's width or
+// height. kOutside: the box's middle is not in the picture. The first that holds.
 enum class BoxFault { kNotFinite, kBadScore, kNoSize, kTooLarge, kOutside };
 inline constexpr int kBoxFaultCount = static_cast<int>(BoxFault::kOutside) + 1;
 
