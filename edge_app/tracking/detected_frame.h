@@ -33,14 +33,14 @@ struct DetectedFrame {
 // What became of a frame.
 enum class DetectionStatus {
   kTaken,
-  kTakenLate,  // put in order of time; later frames are processed again
-  kMalformed,  // cannot be read
-  kTooManyBoxes,
+  kTakenLate,      // put in order of time; later frames are processed again
+  kMalformed,      // cannot be read
+  kTooManyBoxes,   // more than tracking.max_detections
   kUnknownFrame,   // not among the frames kept
   kFrameNotYet,    // later than the newest frame
   kTooLate,        // over tracker.history_s, or history_frames, behind the newest one taken
   kNoOrientation,  // its record has no orientation
-  kRepeated,       // the frame's detections have come already
+  kRepeated,       // detections of a frame of the same time have come already
   kNoGeometry,     // its picture and the world do not fit together
   kQueueFull
 };
