@@ -59,6 +59,9 @@ install(FILES ${packaging}/copyright ${packages_dir}/changelog.gz DESTINATION /u
 # Everything that is packed; `all` would also build the tests.
 get_property(libraries GLOBAL PROPERTY ALIDADE_LIBRARIES)
 add_custom_target(packaged DEPENDS alidade)
+if(TARGET manual)
+  add_dependencies(packaged manual)
+endif()
 foreach(library IN LISTS libraries)
   get_target_property(type ${library} TYPE)
   if(type STREQUAL STATIC_LIBRARY)
