@@ -6,7 +6,7 @@
 //   symmetric-circles:7x6:20mm  distance of neighbours
 //   aprilgrid:6x6:30mm:0.3      side of a tag with its black border, gap as a share of the side
 //   charuco:9x6:30mm:22mm       squares, side of a square, side of a marker, perhaps a dictionary
-// docs/patterns.md has the details. ChArUco boards need a build with opencv_aruco.
+// Details: docs/manual/reference/patterns.md. ChArUco boards need a build with opencv_aruco.
 
 #include <array>
 #include <optional>

@@ -7,6 +7,7 @@
 #include <sys/stat.h>
 
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <map>
@@ -18,6 +19,7 @@
 
 #include "edge_app/config/nearest_word.h"
 #include "edge_app/config/noise_file.h"
+#include "edge_app/config/plane_data.h"
 #include "test/platform/support/head_kinds.h"
 #include "test/support/temporary_directory.h"
 
