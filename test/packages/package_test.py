@@ -102,6 +102,7 @@ class Contents(unittest.TestCase):
         self.assertEqual(files - manual, examples | {
             "etc/alidade/alidade.yaml", "lib/systemd/system/alidade.service", "lib/systemd/system/alidade@.service", "lib/udev/rules.d/60-alidade.rules",
             "usr/bin/alidade", "usr/share/bash-completion/completions/alidade", "usr/share/doc/alidade/changelog.gz", "usr/share/doc/alidade/copyright",
+            "usr/share/lintian/overrides/alidade",
             "usr/share/man/man1/alidade.1.gz"})
 
     def test_the_libraries_come_with_every_header_and_the_cmake_package(self):
