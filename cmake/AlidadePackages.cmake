@@ -51,6 +51,8 @@ install(FILES ${PROJECT_SOURCE_DIR}/edge_app/examples/service.yaml DESTINATION /
 install(FILES ${packages_dir}/alidade.service ${packages_dir}/alidade@.service DESTINATION /lib/systemd/system
   COMPONENT system EXCLUDE_FROM_ALL)
 install(FILES ${packaging}/60-alidade.rules DESTINATION /lib/udev/rules.d COMPONENT system EXCLUDE_FROM_ALL)
+install(FILES ${packaging}/lintian-overrides DESTINATION /usr/share/lintian/overrides RENAME alidade
+  COMPONENT system EXCLUDE_FROM_ALL)
 install(FILES ${packaging}/copyright ${packages_dir}/changelog.gz DESTINATION /usr/share/doc/alidade
   COMPONENT system EXCLUDE_FROM_ALL)
 install(FILES ${packaging}/copyright ${packages_dir}/changelog.gz DESTINATION /usr/share/doc/alidade-dev
@@ -59,6 +61,9 @@ install(FILES ${packaging}/copyright ${packages_dir}/changelog.gz DESTINATION /u
 # Everything that is packed; `all` would also build the tests.
 get_property(libraries GLOBAL PROPERTY ALIDADE_LIBRARIES)
 add_custom_target(packaged DEPENDS alidade)
+if(TARGET manual)
+  add_dependencies(packaged manual)
+endif()
 foreach(library IN LISTS libraries)
   get_target_property(type ${library} TYPE)
   if(type STREQUAL STATIC_LIBRARY)

@@ -7,7 +7,7 @@
 //   aprilgrid:6x6:30mm:0.3      side of a tag with its black border, gap as a share of the side
 //   charuco:9x6:30mm:22mm       squares, side of a square, side of a marker; then a dictionary,
 //                               such as :5x5_100, unless it is 4x4_50
-// docs/patterns.md has the details. ChArUco boards need a build with opencv_aruco.
+// Details: docs/manual/reference/patterns.md. ChArUco boards need a build with opencv_aruco.
 
 #include <array>
 #include <optional>

@@ -20,6 +20,7 @@
 #include "edge_app/output/http/http_server.h"
 #include "edge_app/output/http_api.h"
 #include "edge_app/output/live_state.h"
+#include "edge_app/output/manual_pages.h"
 #include "edge_app/output/mqtt_publisher.h"
 #include "edge_app/output/record_sinks.h"
 #include "edge_app/output/record_writer.h"
@@ -74,6 +75,7 @@ std::unique_ptr<HttpServer> make_http(const Config& config, const HttpApiSources
   auto server = std::make_unique<HttpServer>(*config.output.http);
   add_api_routes(server.get(), sources);
   add_status_page(server.get(), tap);
+  add_manual_pages(server.get(), installed_manual());
   return server;
 }
 

@@ -9,7 +9,7 @@ namespace alidade {
 struct VerifyOptions {
   std::string recording;
   std::string calibration;  // empty: <recording>/alidade/calibration.yaml
-  std::string known;        // DIRECTIONS.csv (docs/commands.md); empty: none
+  std::string known;        // DIRECTIONS.csv, as known_directions.h has it; empty: none
   // Degrees or "free": of the platform's turn against the known directions. Empty: 0.
   std::string heading_sigma, level_sigma;
   std::string directory;  // for verification.html; empty: <recording>/alidade

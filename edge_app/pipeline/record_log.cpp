@@ -37,7 +37,8 @@ void RecordLog::log_old_telemetry(const OrientationRecord& record) {
       "{}: {} at frame {}: it lies {:.0f} ms beyond the newest angle that is trusted{}, and "
       "realtime.max_extrapolation_s is {:.0f} ms; raise it to {:.2f} or more if that does not "
       "grow, or raise pan_tilt.rate_hz, or lower pan_tilt.max_repeat_s as far as `alidade check` "
-      "allows; the causes, by how telemetry_age_s moves: docs/records.md, \"Telemetry too old\"",
+      "allows; the causes, by how telemetry_age_s moves: the manual, Statuses, \"Telemetry too "
+      "old\"",
       pan_tilt_.name(), to_string(record.status), *record.frame, 1e3 * *record.telemetry_age_s,
       later, 1e3 * max_extrapolation_s_, kReserve * *record.telemetry_age_s + 0.005);
 }

@@ -10,7 +10,7 @@
 //                             not localized (SceneStart)
 //   RealtimeStage             images too late to be looked at
 // If OE mode is asked for, kOk occurs in mode OE only. What each status means to a user, and what
-// to do: docs/records.md.
+// to do: docs/manual/reference/statuses.md.
 
 #include <array>
 #include <cstddef>
@@ -33,7 +33,7 @@ enum class RecordStatus : std::uint8_t {
   kTelemetryMissing,  // fewer than two usable samples so far
   // The frame lies more than TelemetryLimits::max_extrapolation_s beyond the newest trusted angle;
   // OrientationRecord::telemetry_age_s says how far. The causes, and which key to change:
-  // docs/records.md.
+  // docs/manual/reference/statuses.md.
   kTelemetryTooOld,
   kTelemetryGap,          // the samples around the frame lie too far apart
   kFrameBeforeTelemetry,  // older than the oldest sample kept by more than max_extrapolation_s

@@ -39,7 +39,7 @@ class StreamWatch {
   [[nodiscard]] std::optional<CalibrationNeed> missing() const;
 
  private:
-  // Half of the frames of 2 s, as docs/records.md says of `needs`.
+  // Half of the frames of 2 s, as record_fields.yaml says of `needs`.
   static constexpr DisagreementOptions kOldTelemetry = {/*span_s=*/2, /*share=*/0.5,
                                                         /*least_frames=*/5};
 

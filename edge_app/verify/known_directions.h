@@ -38,7 +38,8 @@ struct KnownLimits {
   std::vector<std::int64_t> frames;  // of the recording, ascending
 };
 
-// Reads DIRECTIONS.csv (docs/commands.md). False: *error is one line that says what, where, and
+// Reads DIRECTIONS.csv (docs/manual/how-to/know-that-it-is-right.md). False: *error is one line that
+// says what, where, and
 // what would be right.
 [[nodiscard]] bool read_known_directions(const std::string& path, const KnownLimits& limits,
                                          std::vector<KnownDirection>* out, std::string* error);

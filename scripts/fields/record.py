@@ -275,6 +275,6 @@ def generated(files):
         "ros_wrapper/alidade_ros/src/record_fields.cpp": ros_source(to_ros),
     }, {
         "edge_app/output/openapi.yaml": openapi(fields),
-        "docs/records.md": table(fields),
+        "docs/manual/reference/records.md": table(fields),
         "ros_wrapper/alidade_msgs/msg/FrameOrientation.msg": message(to_ros),
     })

@@ -88,6 +88,6 @@ def generated(files):
         "ros_wrapper/alidade_ros/src/target_list_fields.cpp": ros_source(known_to_ros(fields)),
     }, {
         "edge_app/output/openapi.yaml": openapi(fields),
-        "docs/target_tracking.md": table(fields),
+        "docs/manual/reference/targets.md": table(fields),
         "ros_wrapper/alidade_msgs/msg/Targets.msg": message(known_to_ros(fields)),
     })

@@ -153,6 +153,6 @@ def generated(files):
         "ros_wrapper/alidade_ros/src/target_fields.cpp": ros_source(known_to_ros(fields)),
     }, {
         "edge_app/output/openapi.yaml": openapi(fields),
-        "docs/target_tracking.md": table(fields),
+        "docs/manual/reference/targets.md": table(fields),
         "ros_wrapper/alidade_msgs/msg/Target.msg": message(known_to_ros(fields)),
     })

@@ -22,7 +22,7 @@ NOT_SHOWN = {"clock_locked", "telemetry_zero"}
 OF_RECORDS = {
     "edge_app/record/record_fields.h": 'line->add("sun_rad", record.sun_rad);',
     OPENAPI: "sun_rad: {type: number, nullable: true, minimum: -2, maximum: 2, ",
-    "docs/records.md": "| `sun_rad` | rad | how high the Sun stands; `null`: it is night |",
+    "docs/manual/reference/records.md": "| `sun_rad` | rad | how high the Sun stands; `null`: it is night |",
     "ros_wrapper/alidade_msgs/msg/FrameOrientation.msg": "float64 sun ",
     "ros_wrapper/alidade_ros/include/alidade_ros/record_fields.h": "std::optional<double> sun_rad;",
     "ros_wrapper/alidade_ros/src/record_fields.cpp": "message->sun = record.sun_rad.value_or(kNan);",
@@ -30,14 +30,14 @@ OF_RECORDS = {
 OF_TARGETS = {
     "edge_app/tracking/target_fields.h": 'if (on_plane) line->add("height_m", target.height_m);',
     OPENAPI: "height_m: {type: number, nullable: true, minimum: 0, description: \"m; how tall it is; null: nobody knows\"}",
-    "docs/target_tracking.md": "| `height_m` | m | how tall it is; only on the plane; `null`: nobody knows |",
+    "docs/manual/reference/targets.md": "| `height_m` | m | how tall it is; only on the plane; `null`: nobody knows |",
     "ros_wrapper/alidade_msgs/msg/Target.msg": "float64 height               # m; how tall it is; NaN: nobody knows",
     "ros_wrapper/alidade_ros/src/target_fields.cpp": 'message->height = read.number_or_nan("height_m");',
 }
 AROUND_TARGETS = {
     "edge_app/tracking/target_list_fields.h": 'line->add("wind_m_s", list.wind_m_s);',
     OPENAPI: "wind_m_s: {type: number, nullable: true, description: \"m/s; how fast the wind is; null: it is calm\"}",
-    "docs/target_tracking.md": "| `wind_m_s` | m/s | how fast the wind is; `null`: it is calm |",
+    "docs/manual/reference/targets.md": "| `wind_m_s` | m/s | how fast the wind is; `null`: it is calm |",
     "ros_wrapper/alidade_msgs/msg/Targets.msg": "float64 wind                 # m/s; how fast the wind is; NaN: it is calm",
     "ros_wrapper/alidade_ros/src/target_list_fields.cpp": 'message->wind = read.number_or_nan("wind_m_s");',
 }

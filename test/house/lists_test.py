@@ -217,8 +217,8 @@ class Answers(unittest.TestCase):
                                       *(f"edge_app/output/{name}.cpp" for name in ("http_api", "pixel_query", "status_page"))])
 
     def test_routes_are_described(self):
-        routes = {(method, path) for source in files("*.cpp", "edge_app/output")
-                  for method, path in re.findall(r'server->(get|post)\(\s*"(/[^"]*)"', read(source))}
+        routes = {(method, path + ("{file}" if below else "")) for source in files("*.cpp", "edge_app/output")
+                  for method, below, path in re.findall(r'server->(get|post)(_below)?\(\s*"(/[^"]*)"', read(source))}
         self.assertGreater(len(routes), 15)
         described = {(method, path) for path, methods in self.description["paths"].items() for method in methods}
         self.assertEqual(routes, described, "the routes of edge_app/output are not the paths of openapi.yaml")

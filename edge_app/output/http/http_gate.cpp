@@ -49,6 +49,17 @@ void HttpGate::add(const std::string& method, const std::string& path, HttpRoute
   routes_[path][method] = std::move(route);
 }
 
+void HttpGate::add_below(const std::string& method, const std::string& folder, HttpRoute route) {
+  folders_[folder][method] = std::move(route);
+}
+
+const HttpGate::Methods* HttpGate::find(const std::string& path) const {
+  if (const auto found = routes_.find(path); found != routes_.end()) return &found->second;
+  const auto begins = [&path](const auto& row) { return path.rfind(row.first, 0) == 0; };
+  const auto found = std::find_if(folders_.begin(), folders_.end(), begins);
+  return found == folders_.end() ? nullptr : &found->second;
+}
+
 const HttpRoute* HttpGate::admit(const HttpHead& head, double now_s, bool body_to_come,
                                  HttpClient* client, ServerResponse* refusal) {
   const std::optional<HttpRight> right = tokens_.right_of(head.authorization, now_s);
@@ -88,13 +99,13 @@ std::optional<ServerResponse> HttpGate::check(const HttpHead& head, double now_s
   // a place.
   if (!origin_is_own(head) || head.from_other_site)
     return http_error(403, "a page of another site may not ask this");
-  const auto path = routes_.find(head.path);
-  if (path == routes_.end()) return http_error(404, "no such path; see /api/v1/openapi.yaml");
-  const auto found = path->second.find(head.method == "HEAD" ? "GET" : head.method);
-  if (found == path->second.end()) {
+  const Methods* const methods = find(head.path);
+  if (methods == nullptr) return http_error(404, "no such path; see /api/v1/openapi.yaml");
+  const auto found = methods->find(head.method == "HEAD" ? "GET" : head.method);
+  if (found == methods->end()) {
     ServerResponse error = http_error(405, "no such method here; see /api/v1/openapi.yaml");
     std::string allowed;
-    for (const auto& [method, ignored] : path->second)
+    for (const auto& [method, ignored] : *methods)
       allowed += (allowed.empty() ? "" : ", ") + (method == "GET" ? "GET, HEAD" : method);
     error.headers.emplace_back("Allow", allowed);
     return error;

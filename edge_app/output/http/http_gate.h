@@ -66,6 +66,9 @@ class HttpGate {
 
   // Must be called before the first admit().
   void add(const std::string& method, const std::string& path, HttpRoute route);
+  // A route of all paths that begin with `folder`, which ends with a slash, and have none of their
+  // own.
+  void add_below(const std::string& method, const std::string& folder, HttpRoute route);
 
   // Any thread.
   [[nodiscard]] HttpTickets& tickets() { return tickets_; }
@@ -84,6 +87,10 @@ class HttpGate {
   [[nodiscard]] bool charge(const HttpClient& client, double now_s, ServerResponse* refusal);
 
  private:
+  using Methods = std::map<std::string, HttpRoute>;
+
+  // Null: there is no such path.
+  [[nodiscard]] const Methods* find(const std::string& path) const;
   [[nodiscard]] std::optional<ServerResponse> check(const HttpHead& head, double now_s,
                                                     const HttpClient& client,
                                                     const HttpRoute** route);
@@ -101,7 +108,8 @@ class HttpGate {
   RecentAddresses showed_token_;
   HttpTickets tickets_;
   HttpTally& tally_;
-  std::map<std::string, std::map<std::string, HttpRoute>> routes_;  // by path and method
+  std::map<std::string, Methods> routes_;   // by path and method
+  std::map<std::string, Methods> folders_;  // the same, of add_below()
 };
 
 }  // namespace alidade

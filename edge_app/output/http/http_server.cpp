@@ -34,6 +34,10 @@ void HttpServer::get(const std::string& path, HttpAccess access, HttpHandler han
   gate_.add("GET", path, {access, 0, std::move(handler)});
 }
 
+void HttpServer::get_below(const std::string& folder, HttpAccess access, HttpHandler handler) {
+  gate_.add_below("GET", folder, {access, 0, std::move(handler)});
+}
+
 void HttpServer::post(const std::string& path, HttpAccess access, std::size_t max_body,
                       HttpHandler handler) {
   gate_.add("POST", path, {access, max_body, std::move(handler)});

@@ -25,8 +25,11 @@ class HttpServer {
   HttpServer(const HttpServer&) = delete;
   HttpServer& operator=(const HttpServer&) = delete;
 
-  // Must be called before start(). A route is an exact path; HEAD is answered like GET.
+  // Must be called before start(). A route is an exact path, but for get_below(); HEAD is answered
+  // like GET.
   void get(const std::string& path, HttpAccess access, HttpHandler handler);
+  // All paths that begin with `folder`, as "/manual/", and have no route of their own.
+  void get_below(const std::string& folder, HttpAccess access, HttpHandler handler);
   void post(const std::string& path, HttpAccess access, std::size_t max_body, HttpHandler handler);
 
   // For routes of HttpAccess::kStream. Any thread.

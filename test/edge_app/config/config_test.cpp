@@ -7,6 +7,7 @@
 #include <sys/stat.h>
 
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <map>
@@ -18,6 +19,7 @@
 
 #include "edge_app/config/nearest_word.h"
 #include "edge_app/config/noise_file.h"
+#include "edge_app/config/plane_data.h"
 #include "test/platform/support/head_kinds.h"
 #include "test/support/temporary_directory.h"
 
@@ -1189,9 +1191,70 @@ std::string manual(const char* page) {
 }
 
 TEST(VideoTypes, AreInTheManual) {
-  const std::string page = manual("configuration.md");
+  const std::string page = manual("reference/links.md");
   for (const char* name : video_type_names())
     EXPECT_NE(page.find("\n`type: " + std::string(name) + "`"), std::string::npos) << name;
+}
+
+struct ManualBlock {
+  std::string page;
+  std::string kind;  // the class of the block, as "plane"; empty: a whole configuration
+  std::string text;
+};
+
+// The YAML in the pages of the manual.
+std::vector<ManualBlock> yaml_of_the_manual() {
+  std::vector<ManualBlock> blocks;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(ALIDADE_MANUAL)) {
+    if (entry.path().extension() != ".md") continue;
+    std::ifstream file(entry.path());
+    bool inside = false;
+    for (std::string line; std::getline(file, line);) {
+      const std::string kind = ":class: ";
+      if (!inside && (line == "```yaml" || line == "```{code-block} yaml")) {
+        inside = true;
+        blocks.push_back({entry.path().filename(), "", ""});
+      } else if (inside && line == "```") {
+        inside = false;
+      } else if (inside && line.rfind(kind, 0) == 0) {
+        blocks.back().kind = line.substr(kind.size());
+      } else if (inside) {
+        blocks.back().text += line + "\n";
+      }
+    }
+  }
+  return blocks;
+}
+
+TEST(Manual, ShowsConfigurationsThatCanBeRead) {
+  ::setenv("CAMERA_PASSWORD", "secret", 1);
+  const TemporaryDirectory folder;
+  folder.write("tokens", "view 0123456789abcdef0123456789abcdef\n");
+  folder.write("password", "secret\n");
+  const std::string device =
+      "pan_tilt: {type: vapix, url: \"http://camera\"}\nvideo: {type: rtsp, url: \"rtsp://c/v\"}\n"
+      "camera: {focal_length_px: 3000}\n";
+  int whole = 0;
+  int parts = 0;
+  int planes = 0;
+  for (const ManualBlock& block : yaml_of_the_manual()) {
+    std::string error;
+    if (block.kind == "elsewhere") continue;  // of another program
+    if (block.kind == "plane") {
+      PlaneData data;
+      EXPECT_TRUE(parse_plane_data(block.text, block.page, &data, &error)) << error;
+      ++planes;
+      continue;
+    }
+    const bool is_part = block.kind == "part";
+    ++(is_part ? parts : whole);
+    Config config;
+    const std::string path = folder.path() + "/" + block.page;
+    EXPECT_TRUE(parse_config((is_part ? device : "") + block.text, path, &config, &error)) << error;
+  }
+  EXPECT_GT(whole, 15);
+  EXPECT_GT(parts, 0);
+  EXPECT_GT(planes, 0);
 }
 
 TEST(VideoTypes, AreAllNamedToWhoMistypesOne) {
@@ -1203,11 +1266,11 @@ TEST(VideoTypes, AreAllNamedToWhoMistypesOne) {
 }
 
 TEST(Detectors, AreInTheManual) {
-  const std::string page = manual("configuration.md");
+  const std::string page = manual("reference/configuration.md");
   std::ifstream file(ALIDADE_EXAMPLE);
   const std::string example(std::istreambuf_iterator<char>(file), {});
   for (const DetectorKindRow& row : kDetectorKinds) {
-    EXPECT_NE(page.find("`" + std::string(row.name) + "`"), std::string::npos) << row.name;
+    EXPECT_NE(page.find("\n### " + std::string(row.name) + "\n"), std::string::npos) << row.name;
     EXPECT_NE(example.find("\n#   " + std::string(row.name) + ":"), std::string::npos) << row.name;
   }
 }

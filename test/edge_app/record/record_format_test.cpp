@@ -164,7 +164,7 @@ TEST(RecordFormat, EveryStatusHasWordsWithoutACommaOrQuote) {
 }
 
 TEST(Statuses, AreInTheManual) {
-  std::ifstream file(std::string(ALIDADE_MANUAL) + "/records.md");
+  std::ifstream file(std::string(ALIDADE_MANUAL) + "/reference/statuses.md");
   const std::string page(std::istreambuf_iterator<char>(file), {});
   for (const RecordStatus status : kRecordStatuses) {
     EXPECT_NE(page.find("\n| `" + std::string(to_string(status)) + "` | "), std::string::npos)

@@ -364,7 +364,7 @@ TEST_P(EveryHeadOnASerialLine, HasItsRatesInTheTableOfTheDocumentation) {
     rates += text;
   }
   std::vector<std::string> rows;
-  std::istringstream table(text_of("docs/heads.md"));
+  std::istringstream table(text_of("docs/manual/how-to/serial-heads.md"));
   for (std::string line; std::getline(table, line);) {
     // The name alone, or with one of its modes.
     const std::string begin = std::string("| ") + protocol_->name();

@@ -1,0 +1,91 @@
+"""The tables of words and lines that a user meets: words that the program says of itself, with the help of messages.yaml; lines of the
+log; findings of `alidade check`, which say what helps themselves."""
+import re
+
+import yaml
+
+from . import cpp
+
+LIST = "docs/manual/reference/messages.yaml"
+# Group of words: the function that says them, and its file.
+WORDS = {
+    "activities of the calibration": ("edge_app/record/published_calibration.cpp", r"to_string\(CalibrationActivity"),
+    "needs of the calibration": ("edge_app/record/published_calibration.cpp", r"to_string\(CalibrationNeed"),
+    "refusals of a calibration": ("core/calibration/calibration_types.cpp", r"to_string\(CalibrationStatus"),
+    "localization": ("core/mapping/localization.cpp", r"to_string\(LocalizationStatus"),
+    "building a map": ("core/mapping/map_building.cpp", r"to_string\(MapBuild"),
+    "fitting a plane": ("core/ground/plane_fit.cpp", r"to_string\(PlaneFit"),
+    "places on the ground": ("core/ground/world_plane.cpp", r"to_string\(PlaneStatus"),
+    "detections": ("edge_app/tracking/detected_frame.cpp", r"words_of\(DetectionStatus"),
+    "boxes": ("edge_app/tracking/detected_frame.cpp", r"words_of\(BoxFault"),
+    "verdicts of verify": ("edge_app/verify/verification_words.cpp", r"to_string\(Verdict"),
+}
+UNTOLD = ("unknown", "")
+
+
+def body_of(file, head):
+    text = cpp.text_of(file)
+    match = re.search(head, text)
+    if not match:
+        raise cpp.ListError(f"{file}: no function {head}; say in WORDS of scripts/reference/messages.py where its words are")
+    return text[match.start():text.index("\n}", match.start())]
+
+
+def words(group):
+    file, head = WORDS[group]
+    # `return "words";`, or with a label before them: `return {"label", "words"};`
+    said = [cpp.string(one) for one in re.findall(r'return (?:\{"\w+",\s*)?((?:"(?:[^"\\]|\\.)*"\s*)+)\}?;', body_of(file, head))]
+    return [word for word in dict.fromkeys(said) if not word.startswith(UNTOLD[0]) and word != ""]
+
+
+def line(text):
+    text = re.sub(r"\{[^}]*\}", "…", text)
+    return re.sub(r"\s+", " ", text).replace("|", "\\|").strip()
+
+
+def log_lines():
+    """The texts of warnings and errors."""
+    found = {}
+    for path in sorted((cpp.TOP / "edge_app").rglob("*")):
+        if path.suffix in (".h", ".cpp"):
+            name = path.relative_to(cpp.TOP).as_posix()
+            for kind, a in cpp.calls(cpp.text_of(name), ("spdlog::warn", "spdlog::error")):
+                text = cpp.string(a[0]) if a else None
+                if text and re.search(r"[a-z]{3}", re.sub(r"\{[^}]*\}", "", text)):
+                    found[line(text)] = kind.rpartition(":")[2]
+    return found
+
+
+def findings():
+    """(problem or advice, text) of each that `check` may say."""
+    out = {}
+    for path in sorted([*(cpp.TOP / "edge_app/check").glob("*.cpp"), *(cpp.TOP / "edge_app/commands").glob("check*.cpp")]):
+        text = cpp.text_of(path.relative_to(cpp.TOP).as_posix())
+        for kind, a in cpp.calls(text, ("add_problem", "add_advice")):
+            for group in re.findall(r'(?:"(?:[^"\\]|\\.)*"\s*)+', a[1] if len(a) > 1 else ""):
+                said = line(re.sub(r"^(?:video|pan/tilt)? ?\{\}:? ?|^\{\}", "", cpp.string(group)))
+                if len(said.split()) > 5:
+                    out[said] = kind[4:]
+    return out
+
+
+def helps(group, needed):
+    listed = yaml.safe_load((cpp.TOP / LIST).read_text(encoding="utf-8")).get(group, {})
+    for what, missing in (("lacks", [one for one in needed if one not in listed]), ("has what no code says:", [one for one in listed if one not in needed])):
+        if missing:
+            raise cpp.ListError(f"{LIST}: {group}: {what} " + "; ".join(map(repr, missing)))
+    return listed
+
+
+def tables():
+    out = {}
+    for group in WORDS:
+        needed = words(group)
+        listed = helps(group, needed)
+        out[group] = "\n".join(["| words | meaning, and what helps |", "|---|---|", *(f"| `{word}` | {listed[word]} |" for word in needed)])
+    lines = log_lines()
+    listed = helps("lines of the log", lines)
+    out["lines of the log"] = "\n".join(["| line | level | meaning, and what helps |", "|---|---|---|",
+                                         *(f"| {text} | {kind} | {listed[text]} |" for text, kind in sorted(lines.items()))])
+    out["findings of check"] = "\n".join(["| kind | text |", "|---|---|", *(f"| {kind} | {text} |" for text, kind in findings().items())])
+    return out
