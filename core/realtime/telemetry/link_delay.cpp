@@ -13,7 +13,7 @@ constexpr double kLongestGap_s = 0.3;  // between images of one motion
 // Standard deviations of a sample, by which an axis must move within the range: else all delays say
 // the same.
 constexpr double kMoves = 5;
-constexpr int kLeastDegrees = 8;
+constexpr int kLeastDegrees = 16;
 constexpr double kMostLagged = 0.95;  // correlation of neighbours
 // Share of the samples, at least, that the variance of the residuals comes from.
 constexpr double kCompared = 0.5;
