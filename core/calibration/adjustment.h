@@ -1,8 +1,6 @@
 #pragma once
-// Adjustment: bundle adjustment of one calibration by Levenberg-Marquardt with the exact Jacobians
-// of linearisation.h. Landmarks are eliminated first.
-// Ceres is not used: it takes longer for the same minimum (docs/measurements.md), and knots, noise
-// and covariance need the reduced normal matrix. Tests compare both.
+// Adjustment: bundle adjustment of one calibration by Levenberg-Marquardt with the Jacobians of
+// linearisation.h. Landmarks are eliminated first. Time against Ceres: docs/measurements.md.
 // On a path that returns, landmarks tie distant times together, so the reduced matrix is dense. Up
 // to kLargestDirect rows it is solved by Cholesky. A larger one is solved by conjugate gradients
 // (reduced_equations.h), and by Cholesky if these do not converge. Allocates; one object for each
@@ -35,14 +33,14 @@ class Adjustment {
  public:
   static constexpr Eigen::Index kLargestDirect = 900;
 
-  // fixed: the parameters that are exact, by index in GlobalVector. largest_direct: rows. The data
-  // must outlive this object.
+  // fixed: the parameters that are exact, by index in GlobalVector. largest_direct: rows of H, in
+  // place of kLargestDirect. The data must outlive this object.
   Adjustment(const AdjustmentData& data, const AdjustmentPriors& priors,
              const std::array<bool, kGlobalCount>& fixed,
              Eigen::Index largest_direct = kLargestDirect)
       : lineariser_(data, priors, fixed), fixed_(fixed), largest_direct_(largest_direct) {}
 
-  // From now on the parameter keeps its value, which is taken as exact.
+  // From now on the parameter (index in GlobalVector) keeps its value, which is taken as exact.
   void hold(int parameter) {
     fixed_[static_cast<std::size_t>(parameter)] = true;
     lineariser_.hold(parameter);
@@ -53,30 +51,32 @@ class Adjustment {
   }
 
   // Solves H x = g with landmarks eliminated and every diagonal element of H multiplied by 1 +
-  // damping. False if H is not positive definite.
+  // damping. *x_landmark: by block of H_landmark; a direction's change lacks what goes with the
+  // nearness (Linearisation::direction_by_nearness). False if H is not positive definite.
   [[nodiscard]] bool solve(const Linearisation& linearisation, double damping, Eigen::VectorXd* x,
                            std::vector<Vector2<double>>* x_landmark);
 
-  // Solves H x = b, landmarks eliminated, for each column of b. *step: the solution for the
-  // gradient, that is the rest of the way to the minimum. False if H is not positive definite.
+  // Solves H x = b, landmarks eliminated, for each column of b. *step: the solution for g, that is
+  // the rest of the way to the minimum. False if H is not positive definite.
   [[nodiscard]] bool solve_columns(const Linearisation& linearisation, const Eigen::MatrixXd& b,
                                    Eigen::MatrixXd* x, Eigen::VectorXd* step);
 
   // Levenberg-Marquardt until a step promises to reduce the cost by less than `tolerance` (a change
   // of sqrt(tolerance) standard deviations). *at: the linearisation at the final state. False if
-  // the linearisation at the start is not valid, no step reduces the cost, or max_steps are used
-  // up; *state is then the best so far.
+  // the linearisation at the start is not valid, no step reduces the cost, or max_steps (rejected
+  // ones included) are used up; *state is then the best so far.
   [[nodiscard]] bool minimise(const LossScales& loss, int max_steps, double tolerance,
                               AdjustmentState* state, Linearisation* at);
 
-  // Covariance of the local parameters, scaled as in linearisation.h (zero rows where fixed).
-  // *telemetry_unknowns: trace(H^-1 H_telemetry), the number of unknowns that telemetry determines
-  // (Helmert). False if the data leave a direction undetermined.
+  // Covariance of the local parameters, scaled as in linearisation.h; rows and columns of fixed
+  // ones are zero. linearisation: at the minimum, with infinite loss scales. *telemetry_unknowns:
+  // trace(H^-1 H_telemetry), the number of unknowns that telemetry determines (Helmert); by
+  // conjugate gradients an estimate. False if the data leave a direction undetermined.
   [[nodiscard]] bool covariance(const Linearisation& linearisation, GlobalMatrix* covariance,
                                 double* telemetry_unknowns);
 
   // The influence of each observation; zero if it is not used. state and linearisation: those of
-  // the latest covariance().
+  // the latest covariance(), which returned true.
   [[nodiscard]] std::vector<Influence> influences(const AdjustmentState& state,
                                                   const Linearisation& linearisation) const {
     return lineariser_.influences(state, linearisation, global_rows_);

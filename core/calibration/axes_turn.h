@@ -1,17 +1,18 @@
 #pragma once
-// axes_turn(): what two calibrations' covariances need before they are added. The axes' errors are
-// told in the tangent basis of each calibration's own axes (Parameter), and that basis jumps where
-// another coordinate axis becomes the least aligned one (direction.h). Axes that are nearly those of
-// the base are next to such a jump: two estimates of one head may lie on either side of it.
-// Pure; no allocation.
+// axes_turn(): the change of basis that a calibration's covariance needs before that of another one
+// is added. The axes' errors are expressed in the tangent basis of each calibration's own axes
+// (Parameter). This basis jumps where another coordinate axis becomes the least aligned one
+// (direction.h). Axes near those of the base are next to such a jump: two estimates of one head may
+// lie on either side of it. Pure; no allocation.
 
 #include "core/model/calibration.h"
 #include "core/model/direction.h"
 
 namespace alidade::internal {
 
-// T: a small change told with `from`'s axes (rad, local), told with those of `to`; the other
-// parameters stay. n rows, Parameter's first. Exact to first order of the angle between them.
+// T with x_to = T x_from: x is a small change of the parameters, its axes (rad) in the tangent
+// bases of `from` or of `to`; the other parameters stay. A covariance becomes T C T^T. n rows,
+// those of Parameter first. Exact to first order of the angle between the axes.
 template <int n = kParameterCount>
 [[nodiscard]] Matrix<double, n, n> axes_turn(const Mechanics<double>& from,
                                              const Mechanics<double>& to) {

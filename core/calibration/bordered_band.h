@@ -24,8 +24,8 @@ class BorderedBand {
   }
   [[nodiscard]] Eigen::Index rows() const { return border_.cols(); }
 
-  // Row and column by control point, row - column in 0..kReach. The upper triangle of a diagonal
-  // block is not used.
+  // The 2x2 block of two control points, row - column in 0..kReach. The upper triangle of a
+  // diagonal block is not used.
   [[nodiscard]] auto points(int row, int column) {
     return band_.block<2, 2>(2 * (row - column), 2 * column);
   }

@@ -4,7 +4,8 @@
 //   d = b - a                               by Parameter; axes in a's tangent basis
 //   chi_square = d^T (cov_a + cov_b)^-1 d   as if the two were independent
 // Compared are focal length, radial distortion, line delay, both axes and the clock offset. Scales
-// and aspect rest on priors that both calibrations share, and are left out.
+// and aspect rest on priors that both calibrations share, and are left out; so is the optical
+// centre, which must be the same in both (centre_frame.h).
 // If both covariances are right, chi_square is chi-square distributed with as many degrees of
 // freedom as parameters are compared (with 8, 99.9 % lie below 26). px, rad, s. Pure; fixed memory.
 

@@ -96,8 +96,10 @@ void fill_observations(const SelectedInput& selected, const Linearisation& at,
   int used = 0;
   for (std::size_t i = 0; i < observations.size(); ++i) {
     const auto& o = observations[i];
-    result->observation_residuals.push_back(
-        {selected.observation_index[i], at.observations[i].error * o.sigma, !o.used});
+    if (at.observations[i].valid) {
+      result->observation_residuals.push_back(
+          {selected.observation_index[i], at.observations[i].error * o.sigma, !o.used});
+    }
     if (!o.used) continue;
     error_sum += at.observations[i].error.norm() * o.sigma;
     ++used;

@@ -4,34 +4,31 @@
 #include <cmath>
 #include <cstdio>
 
+#include "core/calibration/number_text.h"
+
 namespace alidade {
 
 namespace {
 
 // What is wrong with the pupil or the scene; empty: nothing.
 std::string problem_of_depth(const Pupil& pupil, const std::optional<SceneDistance>& scene) {
-  const auto number = [](double x) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%g", x);
-    return std::string(text);
-  };
   for (int i = 0; i < 3; ++i) {
     const double place = pupil.place_m[i];
     if (std::abs(place) <= kFarthestPupil_m) continue;
-    return "a pupil " + number(std::abs(place)) +
-           " m from where the axes meet; give metres, at most " + number(kFarthestPupil_m) +
+    return "a pupil " + short_text(std::abs(place)) +
+           " m from where the axes meet; give metres, at most " + short_text(kFarthestPupil_m) +
            ", usually 0.02 to 0.1";
   }
   const auto sigma = pupil.sigma_m.array();
   if (!(sigma >= 0).all() || !(sigma <= kFarthestPupil_m).all())
-    return "the pupil's sigma must be 0 to " + number(kFarthestPupil_m) + " m";
+    return "the pupil's sigma must be 0 to " + short_text(kFarthestPupil_m) + " m";
   if (!scene) return {};
   if (!(scene->nearest_m >= kNearestScene_m)) {
-    return "a scene at " + number(scene->nearest_m) + " m; give metres, at least " +
-           number(kNearestScene_m) + ": nearer things need another lens setting";
+    return "a scene at " + short_text(scene->nearest_m) + " m; give metres, at least " +
+           short_text(kNearestScene_m) + ": nearer things need another lens setting";
   }
   if (!(scene->nearest_m < scene->farthest_m)) {
-    return "a scene from " + number(scene->nearest_m) + " to " + number(scene->farthest_m) +
+    return "a scene from " + short_text(scene->nearest_m) + " to " + short_text(scene->farthest_m) +
            " m; give the nearest distance, then the farthest, which is larger";
   }
   return {};

@@ -1,7 +1,6 @@
 #pragma once
 // Input, options and result of calibrate(). Plain values. Angles rad, times s, pixels as in
-// CONVENTIONS.md.
-// Telemetry clock = image clock + clock_offset.
+// CONVENTIONS.md. Telemetry clock = image clock + clock_offset.
 
 #include <cstdint>
 #include <functional>
@@ -32,13 +31,14 @@ struct CalibrationObservation {
 
 struct CalibrationTelemetry {
   double stamp_s = 0;  // telemetry clock
-  double pan_rad = 0;  // as measured, wrapped or not
+  double pan_rad = 0;  // as measured, wrapped or not; beyond +-2.5 pi the input is refused
   double tilt_rad = 0;
   std::optional<std::int64_t> sequence;  // the sender's count, which includes lost samples
 };
 
 // Standard deviations of the noise, and the periods of the streams' clocks. A value that is not
-// given is estimated from the data.
+// given is estimated from the data; so is a sigma of stamps or angles that the data contradict
+// beyond chance. A period without its sigma is only used to count the stream's ticks.
 struct CalibrationNoise {
   std::optional<double> image_stamp_sigma_s;
   std::optional<double> image_period_s;
@@ -78,35 +78,37 @@ struct CalibrationOptions {
   std::optional<CalibrationPrior> focal_length;  // px
   std::optional<CalibrationPrior> aspect = CalibrationPrior{1, 0};
   std::optional<CalibrationPrior> radial_distortion;  // k, no unit
-  // Offset of the optical centre from the image's middle. At one zoom it can hardly be
-  // distinguished from a turn of the axes: the sigmas of centre and axes include this doubt.
+  // Prior of the optical centre's offset from the image's middle. At one zoom this offset can
+  // hardly be distinguished from a turn of the axes: the sigmas of centre and axes include this
+  // doubt.
   Vector2<double> centre_offset_px = Vector2<double>::Zero();
   double centre_sigma_px = 0;                    // each component; 0: known exactly
   std::optional<CalibrationPrior> line_delay;    // s/row
   std::optional<CalibrationPrior> clock_offset;  // s
   CalibrationPrior pan_scale = {1, 1e-8};
   CalibrationPrior tilt_scale = {1, 1e-8};
-  Vector3<double> pan_axis = Vector3<double>::UnitZ();
-  Vector3<double> tilt_axis = Vector3<double>::UnitY();
-  double axis_sigma_rad = 0.05;  // of both axes, each tangent component
+  Vector3<double> pan_axis = Vector3<double>::UnitZ();   // base; normalised before use
+  Vector3<double> tilt_axis = Vector3<double>::UnitY();  // likewise
+  double axis_sigma_rad = 0.05;  // of both axes, each tangent component; 0: known exactly
   // The accuracy that the maker claims for the angles of either axis: one standard deviation of
   // errors that vary slowly over the whole visited range. The recording cannot show such errors, as
   // they look like a scale. 0: no claim; the priors of the scales hold as they are.
   double angle_accuracy_rad = 0;
   // A pupil before the axes makes near things look larger, which no residual shows if all are
-  // equally near. The focal length is that of what is in view. With a scene its sigma also covers
-  // far things, as well as pupil, scene and pictures tell.
+  // equally near. The focal length is that of what is in view. Its sigma also covers far things if
+  // a scene is stated or the pictures show different distances.
   Pupil pupil;
   std::optional<SceneDistance> scene;
 
   StampNoise image_stamps = StampNoise::kSymmetric;
   StampNoise telemetry_stamps = StampNoise::kSymmetric;
-  // Half the range that is searched first. It is widened while the best offset is at its edge.
+  // Half the range that is searched first, about the prior's offset or 0. It is doubled while the
+  // best offset is at its edge.
   double clock_offset_search_s = 1;
   double first_knot_spacing_s = 0.5;  // of the trajectory, before the residuals ask for more knots
-  int max_knots = 2000;
+  int max_knots = 2000;               // the trajectory is not split into this many segments or more
 
-  // Called between steps with the progress (0 to 1) and a few words. Returning false cancels.
+  // Called between stages with the progress (0 to 1) and a few words. Returning false cancels.
   std::function<bool(double, const char*)> progress;
 
   // False and one line in *error (if not null) when a value is out of its range.
@@ -118,14 +120,14 @@ struct CalibrationOptions {
 
 enum class CalibrationStatus {
   kOk,
-  kBadInput,          // nothing to compute with; message says what is wrong
+  kBadInput,          // input or options cannot be used; message says what is wrong
   kNoMotion,          // too little for anything
   kOneAxisOnly,       // pan only or tilt only
   kConstantVelocity,  // clock offset and line delay unknown
   kTooFewLandmarks,
   kTelemetryMismatch,  // telemetry does not describe the video's motion
   kNotConverged,
-  kWeak,      // solved, but a parameter is too uncertain to be published
+  kWeak,      // a parameter is undetermined, or too uncertain to be published
   kCancelled  // by progress()
 };
 
@@ -134,7 +136,7 @@ enum class CalibrationStatus {
 // One stream's clock, fitted as a line through its stamps.
 struct StreamTiming {
   bool steady = false;  // false: the stamps fit no steady period and are used as they are
-  double period_s = 0;
+  double period_s = 0;  // this and the next two: 0 if not steady
   double period_sigma_s = 0;
   double offset_sigma_s = 0;  // of the line at its middle
   double stamp_sigma_s = 0;   // of one stamp about the line
@@ -157,7 +159,7 @@ struct CalibrationExclusions {
   int telemetry_not_finite = 0;
   int telemetry_duplicate = 0;
   int telemetry_outliers = 0;
-  int telemetry_unused = 0;  // before or after the video
+  int telemetry_unused = 0;  // more than 0.25 s before or after the video
 
   // One line for each kind that occurred.
   [[nodiscard]] std::vector<std::string> describe() const;
@@ -165,11 +167,11 @@ struct CalibrationExclusions {
 
 struct CalibrationLandmark {
   std::int64_t landmark = 0;  // name, as in CalibrationObservation
-  Vector3<double> d_b;        // unit direction
+  Vector3<double> d_b;        // unit direction, base
   // rad^2, in tangent_basis(d_b). From the landmark's own observations, with camera and trajectory
   // taken as known.
   Matrix2<double> covariance = Matrix2<double>::Zero();
-  int observations = 0;
+  int observations = 0;  // that were used, two or more
 };
 
 struct FrameResult {
@@ -180,19 +182,19 @@ struct FrameResult {
 };
 
 // Seen minus projected (A^-1 e of linearisation.h). Its standard deviation is the observation's
-// sigma_px if the stated noise is right.
+// sigma_px if the stated noise is right. An outlier without a projection has none.
 struct ObservationResidual {
   std::size_t observation = 0;  // index into the input
   Vector2<double> error_px;
   bool outlier = false;
 };
-// Telemetry with a coarse angle resolution gives one more item for each change of a reading. Its
-// time is the middle of the two samples' times, when the angle passed half-way between the
-// readings. Its error is NaN for an axis that did not change.
+// Telemetry with a coarse angle resolution gives one more item for each change of a reading by one
+// step. Its time is the middle of the two samples' times, when the angle passed half-way between
+// the readings. Its error is NaN for an axis that did not change so.
 struct TelemetryResidual {
-  std::size_t sample = 0;  // index into the input
-  double time_s = 0;       // image clock
-  Vector2<double> error_rad;
+  std::size_t sample = 0;     // index into the input
+  double time_s = 0;          // image clock
+  Vector2<double> error_rad;  // measured, less telemetry_error, minus predicted
   Vector2<double> sigma_rad;  // as used; infinite where rounding, not noise, makes the error
   bool outlier = false;
 };
@@ -200,13 +202,13 @@ struct TelemetryResidual {
 // Parts of the recording disagree in a parameter by more than chance. The parameter's sigma has
 // grown accordingly.
 struct CalibrationContradiction {
-  std::string parameter;
-  std::string between;  // which parts: "stretches of time"
-  double scatter = 1;   // of the parts' values, over the scatter that their noise explains
+  std::string parameter;  // its name, or "clock_drift"
+  std::string between;    // which parts: "stretches of time"
+  double scatter = 1;     // of the parts' values, over the scatter that their noise explains
 };
 
-// A departure from the model that the residuals show beyond chance. The sigmas include its effect
-// on the parameters.
+// A departure from the model that the residuals show beyond chance; beside one, also a "possible"
+// one that they do not exclude. The sigmas include its effect on the parameters.
 struct CalibrationCause {
   std::string cause;  // "play of pan"
   double chi_square = 0;
@@ -216,7 +218,8 @@ struct CalibrationCause {
 };
 
 struct CalibrationQuality {
-  double pixel_sigma_ratio = 0;      // RMS of residual / stated noise, redundancy accounted for
+  // RMS of residual / stated noise, redundancy accounted for; 1 if only chance makes a difference.
+  double pixel_sigma_ratio = 0;
   double telemetry_sigma_ratio = 0;  // likewise
   // How many observations of a landmark in neighbouring frames count as one independent
   // observation, as their errors are correlated. 1: independent. The sigmas account for it.
@@ -244,8 +247,10 @@ struct CalibrationQuality {
 
 struct CalibrationResult {
   CalibrationStatus status = CalibrationStatus::kBadInput;
-  std::string message;      // what is wrong and what would help; with kOk a summary
-  Calibration calibration;  // meaningful with kOk and, for diagnosis, kWeak
+  std::string message;  // what is wrong and what would help; with kOk a summary
+  // Meaningful with kOk and, for diagnosis, with kWeak, unless `frames` is empty: then a parameter
+  // is undetermined.
+  Calibration calibration;
   // Errors of the telemetry's angles that the data show, besides scale and noise. The calibration
   // and its covariance allow for them.
   TelemetryError telemetry_error;

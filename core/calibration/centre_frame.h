@@ -15,8 +15,8 @@
 
 namespace alidade {
 
-// G: d axes (rad, local as in Parameter) / d centre (px), of one camera whose frame is defined by
-// another axis. The other rows are zero.
+// G: d axes (rad, local as in Parameter) / d c: what changes if the same camera's frame gets its z
+// axis through a pixel that is c px farther right and down. The other rows are zero.
 [[nodiscard]] inline Matrix<double, kParameterCount, 2> axes_by_centre(const Calibration& c) {
   // The camera frame's turn that takes its axis to a centre to the right, or below.
   Matrix<double, 3, 2> turn = Matrix<double, 3, 2>::Zero();
@@ -34,8 +34,8 @@ namespace alidade {
 
 namespace internal {
 
-// (S - G) and V: the centre's share in the covariance of a calibration that states the centre as
-// exact. free: the calibration with a free centre.
+// (S - G) and V: the centre's share in the covariance of a calibration whose centre becomes exact.
+// free: the calibration with a free centre. If its centre is exact, the share does not exist.
 [[nodiscard]] inline CentreShare<kParameterCount> share_in_frame(const Calibration& free) {
   CentreShare<kParameterCount> share = centre_share<kParameterCount>(free.covariance);
   if (!share.exists()) return share;
@@ -63,7 +63,8 @@ namespace internal {
   return weighted.dot(of_data.inverse() * weighted) > kLimit;
 }
 
-// The frame's axis goes through the centre's estimate. For a centre that is shown.
+// The calibration in the camera frame whose z axis goes through the centre's estimate. Only the
+// covariance changes. For a centre that is shown (centre_is_shown()).
 [[nodiscard]] inline Calibration with_frame_through_centre(const Calibration& free) {
   Calibration out = free;
   out.covariance = internal::with_centre_held(
@@ -72,8 +73,9 @@ namespace internal {
   return out;
 }
 
-// The frame's axis goes through the prior's centre. exact: from the same data as `free`, with the
-// prior's centre as exact; its covariance lacks the effect of the centre's error, which is added.
+// The calibration in the camera frame whose z axis goes through the prior's centre. exact: from the
+// same data as `free`, with the prior's centre as exact; its covariance lacks the effect of the
+// centre's error, which is added. `exact` itself if the centre of `free` is exact, too.
 [[nodiscard]] inline Calibration with_centre_error(const Calibration& exact,
                                                    const Calibration& free) {
   internal::CentreShare<kParameterCount> share = internal::share_in_frame(free);

@@ -19,9 +19,10 @@ namespace alidade::internal {
 
 template <int n>
 struct CentreShare {
-  Matrix<double, n, 2> slope = Matrix<double, n, 2>::Zero();  // S; zero: the centre is exact
+  Matrix<double, n, 2> slope = Matrix<double, n, 2>::Zero();  // S
   Matrix2<double> covariance = Matrix2<double>::Zero();       // V, px^2
 
+  // False: the centre is exact.
   [[nodiscard]] bool exists() const { return covariance.diagonal().minCoeff() > 0; }
   // S V S^T.
   [[nodiscard]] Matrix<double, n, n> part() const { return slope * covariance * slope.transpose(); }

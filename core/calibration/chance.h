@@ -4,7 +4,7 @@
 namespace alidade::internal {
 
 // Natural logarithm of the probability that chi-square with `freedom` degrees of freedom (> 0, any
-// real number) exceeds `value`. If the result is below -1, its relative error is below 1e-9.
+// real number) exceeds `value`; 0 if value <= 0. Below -1 its relative error is less than 1e-9.
 [[nodiscard]] double log_chance(double value, double freedom);
 
 }  // namespace alidade::internal

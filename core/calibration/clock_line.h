@@ -6,8 +6,9 @@
 // highest line below the stamps (core/model/lower_line.h). The least delay becomes part of the
 // clock offset. The line's sigmas follow from the measured number of delays near the least one;
 // behind a relay that delays evenly they are few, and the line is less certain.
-// n_i are sequence numbers. Without them they are counted along the stamps, gaps included. Stamps
-// that fit no steady clock, or have none (a polled device), stay as they are. Allocates.
+// n_i are sequence numbers. Unless all stamps have one and they increase, n_i are counted along the
+// stamps, gaps included. Stamps that fit no steady clock, or have none (a polled device), stay as
+// they are. Allocates.
 
 #include <cstdint>
 #include <optional>
@@ -16,13 +17,15 @@
 namespace alidade::internal {
 
 struct ClockInput {
-  std::vector<double> stamp_s;                        // increasing; any clock
+  std::vector<double> stamp_s;                        // in the order of the ticks; any clock
   std::vector<std::optional<std::int64_t>> sequence;  // as long as stamp_s
-  std::optional<double> stamp_sigma_s;                // as stated; empty: from the residuals
-  std::optional<double> period_s;                     // if known; ticks are counted with it
-  std::optional<double> period_sigma_s;               // > 0: the known period joins the fit
-  bool one_sided = false;                             // stamps are never early
-  bool own_times = false;                             // no clock behind the stamps: not steady
+  // Symmetric noise: as stated; empty or contradicted by the residuals: from these.
+  std::optional<double> stamp_sigma_s;
+  std::optional<double> period_s;  // if known; ticks are counted with it
+  // > 0: the known period joins the fit; with one-sided noise it only limits the search.
+  std::optional<double> period_sigma_s;
+  bool one_sided = false;  // stamps are never early
+  bool own_times = false;  // no clock behind the stamps: not steady
 };
 
 // If not steady, period_s, middle_s and both their sigmas are 0.

@@ -1,8 +1,8 @@
 #pragma once
 // Do parts of a recording contradict each other, and by how much must the sigmas then grow? Parts
 // are blocks of time, cells of an axis's angle, or runs between two reversals of an axis. Each part
-// is longer than the errors of neighbouring frames are correlated. What the model leaves out and
-// the trajectory does not absorb moves the parameters part by part:
+// is longer than the correlation of the residuals. What the model leaves out and the trajectory
+// does not absorb moves the parameters part by part:
 //   z_c = sum of F_i e_i over the rows of part c           F_i influence, e_i residual
 //   growth of parameter p = sum_c z_c,p^2 / sum_c V_c,pp   V_c: variance of z_c with white errors
 // A growth that chance explains is left out. Derivation: docs/calibration.md. Allocates.
@@ -19,7 +19,7 @@ namespace alidade::internal {
 struct Division {
   std::string name;  // "stretches of time"
   int parts = 0;
-  std::function<int(double time_s)> part_at;  // image clock
+  std::function<int(double time_s)> part_at;  // image clock; 0 to parts - 1
 };
 
 // What one division shows about one parameter.
@@ -47,13 +47,14 @@ struct ContradictionCheck {
 [[nodiscard]] std::vector<Division> usual_divisions(const TrajectorySpline& trajectory,
                                                     double begin_s, double end_s);
 
-// Indices of the result: division, parameter.
+// Indices of the result: division, parameter. Here and below, at: the minimum of least squares, of
+// which `adjustment` has the covariance and `factor` the Cholesky factor.
 [[nodiscard]] std::vector<std::vector<PartGrowth>> part_growth(
     const std::vector<Division>& divisions, const Adjustment& adjustment,
     const AdjustmentState& state, const Linearisation& at, const ReducedFactor& factor);
 
-// The largest growth beyond chance in any division. False alarms: 1 % for all divisions and
-// parameters together.
+// Of each parameter the largest growth beyond chance in any division, corrected for few parts.
+// False alarms: 1 % for all divisions and parameters together.
 [[nodiscard]] ContradictionCheck check_contradictions(const std::vector<Division>& divisions,
                                                       const Adjustment& adjustment,
                                                       const AdjustmentState& state,

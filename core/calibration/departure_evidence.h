@@ -1,11 +1,11 @@
 #pragma once
-// Evidence and posterior of departures from the model, before anything is adjusted for them: of
-// additional linear parameters c, with all other parameters eliminated.
-//   log p(data | c) = g^T c - c^T S c / 2 + const      g score (departure_score.h's s)
-//                                                      S information, positive semidefinite
+// Evidence and posterior of departures from the model: of additional linear parameters c, with all
+// other parameters eliminated. No new adjustment is needed.
+//   log p(data | c) = g^T c - c^T S c / 2 + const      g score, S information (positive
+//                                                      semidefinite): s and N of departure_score.h
 //   c ~ N(0, K)      log evidence = g^T P g / 2 - log det(I + K S) / 2,  P = (S + K^-1)^-1 = cov(c)
 // K is made of parts, each present or not:
-//   curve    A^2 exp(-(i - j)^2 / 2 L^2) on knots i, j: any smooth error
+//   curve    A^2 exp(-(i - j)^2 / (2 L^2)) on knots i, j: any smooth error
 //   ripple   A^2 cos(2 pi (i - j) / L) on knots: a sine of any phase, as a gear's
 //   number   A^2
 // The evidence chooses parts, A and L (type-II likelihood). K may be singular, so its root R is
@@ -22,10 +22,10 @@ enum class DepartureShape { kCurve, kRipple, kNumber };
 struct DeparturePart {
   DepartureShape shape = DepartureShape::kNumber;
   Eigen::Index first = 0;
-  Eigen::Index count = 1;  // knots; 1 for a number, which is present only if it is positive
+  Eigen::Index count = 1;  // knots; 0: never present. 1 for a number, which must come out positive
   bool closed = false;     // curve: the last knot's neighbour is the first
-  double unit = 1;         // of c's unit: the search for A begins here; least A: 1e-3 unit
-  double largest = 1e3;    // of c's unit: the largest A; unit and largest do not bind a number
+  double unit = 1;         // in the unit of c: the search for A begins here; least A: 1e-3 of it
+  double largest = 1e3;    // in the unit of c: the largest A; neither limit holds for a number
   int rival = -1;          // index of a part that is never present together with this one; -1: none
 };
 
@@ -38,23 +38,24 @@ struct DeparturePrior {
 
 struct DepartureFit {
   std::vector<DeparturePrior> priors;  // for each part
-  Eigen::VectorXd mean;                // of c; zero where no part is present
+  Eigen::VectorXd mean;                // of c; zero where neither a present part nor `sure` acts
   Eigen::MatrixXd covariance;          // of c; likewise
   double unknowns = 0;                 // trace(P S): how many numbers the data determine
 
   [[nodiscard]] bool any() const;  // a part is present
 };
 
-// Log evidence that a part must gain to be present. With it, chance makes a part present in less
-// than one of some hundred recordings without any departure.
+// Log evidence that a part must gain to be present. Of recordings without any departure, chance
+// then shows a part in less than one of a hundred.
 inline constexpr double kLeastGain = 7;
 
 // R of one part, with its amplitude. rows: the size of c.
 [[nodiscard]] Eigen::MatrixXd prior_root(const DeparturePart& part, const DeparturePrior& prior,
                                          Eigen::Index rows);
 
-// Chooses the parts that are present, with A and L; one result for each part. sure: the root R of
-// what is present in any case, as many rows as c; empty: nothing is.
+// Chooses the parts that are present, with A and L; one result for each part. Curves are tried
+// last. information, score (here and below): S and g. sure (likewise): the root R of what is
+// present in any case, as many rows as c; empty: nothing is.
 [[nodiscard]] std::vector<DeparturePrior> choose_departures(const Eigen::MatrixXd& information,
                                                             const Eigen::VectorXd& score,
                                                             const std::vector<DeparturePart>& parts,
@@ -62,7 +63,8 @@ inline constexpr double kLeastGain = 7;
                                                             double least_gain = kLeastGain);
 
 // Moves A and L of the ripples that are present to the nearest maximum of the evidence. A ripple
-// whose period becomes too long for one is replaced by the curve on the same knots.
+// whose period becomes too long to be told from a bend is removed; the curve with the same `first`,
+// which must be among the parts, gets its likeliest prior unless it is present already.
 void refine_departures(const Eigen::MatrixXd& information, const Eigen::VectorXd& score,
                        const std::vector<DeparturePart>& parts, const Eigen::MatrixXd& sure,
                        std::vector<DeparturePrior>* priors);

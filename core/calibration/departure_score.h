@@ -1,10 +1,10 @@
 #pragma once
 // DepartureScore: what the residuals at the minimum say of unknowns theta that the adjustment does
-// not have. To first order the truth adds X theta to the errors e, X some columns for each row.
+// not have. To first order theta adds X theta to the errors e; X has some columns for each row.
 //   score s = X^T e,   information N = X^T X - X^T J H^-1 J^T X
 // Trajectory, landmarks and parameters are eliminated: what they absorb does not count. The best
-// theta is N^-1 s, and s^T N^-1 s is chi-square if theta is 0. A theta that is left out moves the
-// parameters by effect theta. e has the unit of its sigma, theta that of the caller's columns.
+// theta is N^-1 s, and s^T N^-1 s is chi-square if theta is 0. Leaving theta out moves the
+// parameters by effect() theta. e is in units of its sigma, theta in those of the caller's columns.
 // Derivation: docs/calibration.md. Allocates.
 
 #include <Eigen/Core>

@@ -18,15 +18,18 @@ struct DepthSpread {
   double log_chance = 0;
   double excess = 0;     // chi-square along the radius minus that across it, at least 0
   double landmarks = 0;  // count of those that moved through the picture
-  double sigma = 0;      // standard deviation of rho o (no unit), separate and over the scene
+  // Standard deviation of rho o (no unit): of landmarks by themselves, and over the scene,
+  // together.
+  double sigma = 0;
 };
 
-// state, at, factor: the minimum of least squares, without nearness in the state.
+// state, at, factor: the minimum of least squares, without nearness in the state; adjustment has
+// its covariance.
 [[nodiscard]] DepthSpread depth_spread(const Adjustment& adjustment, const AdjustmentState& state,
                                        const Linearisation& at, const ReducedFactor& factor);
 
-// With it: that of the landmarks' nearness, which the adjustment has found; excess: its chi-square;
-// log_chance: 0.
+// For a state with nearness, at the minimum: the spread of the estimated nearness, less its errors.
+// excess: chi-square of the nearness about its mean; log_chance: 0.
 [[nodiscard]] DepthSpread nearness_spread(const AdjustmentState& state, const Linearisation& at);
 
 }  // namespace alidade::internal

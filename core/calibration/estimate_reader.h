@@ -38,7 +38,8 @@ class EstimateReader {
   [[noreturn]] void fail(const YAML::Node& node, const std::string& text) const;
   [[nodiscard]] const YAML::Node& root() const { return root_; }
 
-  // Requires the format's number. kind completes "not ...". known: the keys allowed at the top.
+  // Requires a map with the entry `format: 1` and no other keys than `known`. kind completes
+  // "not ...".
   void check_top(const std::string& kind, const std::vector<std::string>& known) const;
   // prefix, here and below: the path of the map, with a dot at its end.
   void check_keys(const YAML::Node& map, const std::vector<std::string>& known,
@@ -61,7 +62,7 @@ class EstimateReader {
   // largest_sigma.
   void read_covariance(const YAML::Node& entry, const EstimateRows& rows,
                        Eigen::Ref<Eigen::MatrixXd> covariance) const;
-  // Checks that sigma agrees with the variance in the covariance of the same file.
+  // Requires that sigma agrees, to 0.1 %, with the variance in the covariance of the same file.
   void check_sigma(const YAML::Node& node, const std::string& name, double sigma,
                    double variance) const;
 

@@ -19,8 +19,8 @@ namespace alidade {
 // By CalibrationFrame::frame: the time at which row 0 was exposed; s on the image clock.
 using FrameTimes = std::unordered_map<std::int64_t, double>;
 
-// Empty if nothing could be compared: an observation needs a frame with a time, a landmark of the
-// result, and a projection.
+// result: of calibrate(), with kOk. Empty if nothing could be compared: an observation needs a
+// frame with a time, a landmark of the result, and a projection.
 [[nodiscard]] std::optional<double> held_out_error(
     const std::vector<CalibrationObservation>& held_out, const FrameTimes& time_of,
     const CalibrationResult& result);

@@ -1,12 +1,13 @@
 #pragma once
 // select_input(): first stage of calibrate(). Selects and orders the usable input.
-//   frames         finite stamp, each name once; ordered by sequence number if all have one, else
-//                  by stamp
-//   telemetry      finite, each number (or stamp) once; ordered likewise
+//   frames         finite stamp, the first of each name; ordered by sequence number if all have
+//                  one, else by stamp
+//   telemetry      finite; ordered likewise; the first of each sequence number (or else stamp)
 //   observations   finite, sigma > 0, in the image or up to 1 px outside of it, in a used frame
 //                  that shows its landmark once, of a landmark in two frames or more; ordered by
 //                  landmark, then frame
-// Refuses too little of any, and other units: degrees, normalised coordinates. Allocates.
+// Refuses fewer than 3 frames, 8 telemetry samples or kMinLandmarks landmarks, an empty image, and
+// other units: angles beyond 2.5 pi (degrees), normalised coordinates. Allocates.
 
 #include <cstddef>
 #include <cstdint>
@@ -29,8 +30,8 @@ struct SelectedInput {
   std::vector<std::int64_t> landmark_name;     // for each landmark of data.observations
 };
 
-// Fills the indices, the names and data.observations. The times are set later, by fit_clocks()
-// (recording_clocks.h). *excluded counts what is left out.
+// *selected: empty. Fills the indices, the names and data.observations. Times and telemetry are set
+// later, by fit_clocks() (recording_clocks.h). *excluded counts what is left out.
 [[nodiscard]] StageStatus select_input(const CalibrationInput& input, SelectedInput* selected,
                                        CalibrationExclusions* excluded);
 

@@ -2,11 +2,10 @@
 // choose_knots(): where the trajectory needs more knots. A score test: by how much would the sum of
 // squares fall if every segment were halved (one Gauss-Newton step of the spline alone)? A segment
 // has two new unknowns: its gain is a chi-square of two degrees of freedom under pure noise.
-// Splits a segment whose own gain is beyond chance among all segments (1 %). If 16 neighbouring
-// segments together gain twice what noise gives, a gain above its expectation is enough. Both
-// halves need two frames or samples. (Oth, section 4.2) tests a segment's whole cost, in which
-// noise drowns a bias that all residuals of a frame share. Derivation: docs/calibration.md.
-// Allocates.
+// Splits a segment whose own gain is beyond chance among all segments (1 %). If it and its
+// neighbours, 16 segments, together gain 4 standard deviations more than noise gives (twice as
+// much), a gain above its expectation is enough. Both halves need two frames or samples.
+// Derivation: docs/calibration.md. Allocates.
 
 #include <vector>
 
@@ -20,6 +19,7 @@ struct KnotChoice {
   std::vector<int> split;  // segments, in increasing order
 };
 
+// linearisation: at a state with this trajectory, near its minimum.
 [[nodiscard]] KnotChoice choose_knots(const AdjustmentData& data,
                                       const TrajectorySpline& trajectory,
                                       const Linearisation& linearisation);

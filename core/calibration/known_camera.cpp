@@ -62,7 +62,9 @@ class KnownCameraTrial {
 
  private:
   [[nodiscard]] static bool is_solved(const CalibrationResult& result) {
-    return result.ok() || result.status == CalibrationStatus::kWeak;
+    // Weak, too, is what has no covariance: then the calibration is not filled in.
+    return result.ok() ||
+           (result.status == CalibrationStatus::kWeak && result.quality.observations > 0);
   }
 
   CalibrationResult calibrate_part(CalibrationOptions options, double begin, double end) const {

@@ -24,7 +24,7 @@ struct KnownCamera {
   std::string name;  // origin, such as a file's name; remarks begin with it
   KnownValue focal_length;
   KnownValue aspect;
-  KnownValue radial_distortion;
+  KnownValue radial_distortion;  // wanted: focal_length.prior must be set, wanted or not
   KnownValue line_delay;
 
   [[nodiscard]] bool empty() const {

@@ -1,7 +1,8 @@
 #pragma once
 // Eliminates the landmarks from the normal equations H x = g: given x, each landmark's direction is
-// the best one. What remains is S = H - Y Y^T and g - Y y, with Y = H_touched L^-T,
-// y = L^-1 g_landmark, L L^T = H_landmark. Y has two columns for each landmark.
+// the best one. What remains is S = H - Y Y^T and g - Y y, with Y = [H_touched; H_camera] L^-T,
+// y = L^-1 g_landmark, L L^T = H_landmark (Linearisation). Y has two columns for each block of
+// H_landmark.
 
 #include <Eigen/Cholesky>
 #include <cstddef>
@@ -13,8 +14,9 @@ namespace alidade::internal {
 
 using CameraRows = Eigen::Matrix<double, kObservedCount, 2>;
 
-// The columns of Y that belong to one landmark, and its part of y (gradient). points: the control
-// points in Linearisation::touched, in its order.
+// The columns of Y that belong to one block, and its part of y (gradient). landmark: the block's
+// index in H_landmark. points: the rows of the control points that it touches, in the order of
+// Linearisation::touched. camera: the rows of the first kObservedCount parameters.
 struct EliminatedLandmark {
   std::size_t landmark = 0;
   std::vector<Matrix2<double>> points;
@@ -22,9 +24,9 @@ struct EliminatedLandmark {
   Vector2<double> gradient;
 };
 
-// Calls use(const EliminatedLandmark&) for each observed landmark; the argument is valid during the
-// call. The diagonal of each landmark's block is multiplied by 1 + damping. False if a landmark's
-// block is not positive definite.
+// Calls use(const EliminatedLandmark&) for each block of a landmark with an observation in use; the
+// argument is valid during the call. The diagonal of each block is multiplied by 1 + damping. False
+// if a block is not positive definite; `use` is not called for it and those after it.
 template <class Use>
 [[nodiscard]] bool eliminate_landmarks(const Linearisation& in, double damping, Use use) {
   EliminatedLandmark out;

@@ -1,7 +1,7 @@
 #pragma once
 // Clock offset and focal length from motion alone, without a guess. Over some 0.5 s the image moves
 // by
-//   (-f cos(tilt) dpan, f dtilt).
+//   (-f cos(tilt) dpan, f dtilt)        px right and down, angles in rad.
 // The clock offset is the shift of time at which the tracks' median motion correlates best with
 // the telemetry's. f is the ratio of the two motions at the best shift. Medians and the normalised
 // correlation need neither a guess of f nor clean tracks. Small tilt and nominal axes are assumed.
@@ -34,8 +34,8 @@ struct MotionMatch {
   double half_range_s = 0;  // of the search
 };
 
-// The best shift within half_range_s of centre_s, to 0.1 ms. telemetry: over the telemetry clock.
-// signs: factors of pan and tilt; -1 reverses an axis.
+// The best shift within half_range_s of centre_s, to 0.1 ms. telemetry: measured angles over the
+// telemetry clock. signs: factors of pan and tilt; -1 reverses an axis.
 [[nodiscard]] MotionMatch match_motion(const std::vector<ImageMotion>& motion,
                                        const TrajectorySpline& telemetry, double centre_s,
                                        double half_range_s, const Vector2<double>& signs = {1, 1});
@@ -47,9 +47,9 @@ struct ReversedAxes {
 };
 
 // The axes whose reversal leaves at most a third of what is unexplained without it, 1 -
-// correlation^2. match: the result without reversal. None if both motions correlate by less than
-// 0.9, or the motion about a reversed axis by less than 0.8. Takes three times as long as
-// match_motion().
+// correlation^2. match: the result without reversal. An axis is reversed only if then the whole
+// motions of image and telemetry correlate by 0.9 or more, and those about this axis by 0.8 or
+// more. Takes three times as long as match_motion().
 [[nodiscard]] ReversedAxes reversed_axes(const std::vector<ImageMotion>& motion,
                                          const TrajectorySpline& telemetry,
                                          const MotionMatch& match);

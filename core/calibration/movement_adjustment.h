@@ -3,11 +3,11 @@
 //   sum |A^-1 (u - pi(R(p(t + v l))^T d; f, k, c at t + v l))|^2 / sigma_px^2
 // + sum |measured - scale p|^2 / sigma_rad^2           telemetry, unwrapped, with a robust loss
 // + sum |n_i|^2 / sigma_i^2
-// over splines of pan, tilt and log f (constant at either dwell), directions d, and n. n is the
-// difference of distortion and centre from the curve's, at places along the movement; sigma_i is
-// the curve's. A: as in linearisation.h, with f's rate. Line delay, axes, scales and clock offset
-// are fixed. The loss of observations is robust first, then least squares on the inliers.
-// Allocates.
+// over splines of pan, tilt and log f (constant at either dwell), directions d (base), and n. n is
+// the difference of distortion and centre from the curve's, at places along the movement; sigma_i
+// is the curve's. A: as in linearisation.h, with f's rate in u'. Line delay, axes, scales, aspect
+// and clock offset are fixed. The loss of observations is robust first, then least squares on the
+// inliers. Allocates.
 
 #include <Eigen/Core>
 #include <string>
@@ -47,10 +47,12 @@ class MovementAdjustment {
   // curve: start values, distortion, centre and shared parameters. It must outlive this object.
   MovementAdjustment(MovementData data, const ZoomCurve& curve);
 
-  // False and one line in *error: no minimum, or something is left undetermined.
+  // False and one line in *error: no landmark has a projection, too few tracks agree, or something
+  // is left undetermined.
   [[nodiscard]] bool run(std::string* error);
 
   [[nodiscard]] int unknowns() const { return unknowns_; }
+  // Counts of the tracks that came in and of the frames that they are in, outliers included.
   [[nodiscard]] int landmarks() const { return static_cast<int>(landmarks_.size()); }
   [[nodiscard]] int frames() const { return frames_; }
   [[nodiscard]] double begin_s() const { return spline_.begin_s(); }

@@ -1,9 +1,10 @@
 #pragma once
 // NearnessColumns: the normal equations of each landmark's nearness, with its direction eliminated,
 // as further landmarks of a Linearisation:
-//   c = H_ll^-1 h_l,   h = h_ss - h_l^T c,   its row to all others: h_o - H_ol c,   g = g_s - c^T g_l
-// s the nearness, l the direction. Their second unknown is none. Units of sigma. Allocates.
-// Derivation: docs/calibration.md.
+//   c = H_ll^-1 h_l,   h = h_ss - h_l^T c,   g = g_s - c^T g_l,   row to all others: h_o - H_ol c
+// s is the nearness, l the direction, o all others; h_ss, h_l, h_o are the entries of s in the
+// normal matrix with itself, l and o. Such a landmark's second unknown is a dummy. Errors in units
+// of sigma. Allocates. Derivation: docs/calibration.md.
 
 #include <Eigen/LU>
 #include <cstddef>
@@ -15,7 +16,7 @@ namespace alidade::internal {
 
 class NearnessColumns {
  public:
-  // information: of the prior about 0.
+  // information: of each nearness's prior, whose mean is 0.
   explicit NearnessColumns(double information) : information_(information) {}
 
   // The next landmark, at its nearness.
@@ -28,7 +29,8 @@ class NearnessColumns {
     cost_ += information_ * nearness * nearness;
   }
 
-  // An observation of it that is in use.
+  // An observation of it that is in use: error and J as in ObservationModel::Result, weight the
+  // robust one.
   void add(const TrajectorySpline::Basis& basis, double weight, const Vector2<double>& error,
            const Matrix2<double>& J_angle, const Matrix2<double>& J_landmark,
            const Vector2<double>& J_nearness,
@@ -68,7 +70,7 @@ class NearnessColumns {
     if (seen) out->nearness_unknowns += 1 - information_ / left;
   }
 
-  // After the last landmark.
+  // Once, after the last landmark. Adds the cost of the priors, too.
   void append_to(Linearisation* out) const {
     const std::size_t landmarks = H_landmark_.size();
     const std::size_t count = out->touched.size();

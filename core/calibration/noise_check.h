@@ -12,8 +12,8 @@ struct NoiseRatio {
   double ratio = 1;       // root mean square, redundancy accounted for
   double redundancy = 0;  // degrees of freedom behind the ratio
 
-  // Whether the ratio is off beyond chance: ratio^2 has a standard deviation of
-  // sqrt(2 / redundancy).
+  // Whether ratio^2 differs from 1 by more than 4 of its standard deviations, sqrt(2 / redundancy).
+  // redundancy must be > 0.
   [[nodiscard]] bool contradicts() const;
 };
 

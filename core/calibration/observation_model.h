@@ -12,10 +12,11 @@ namespace alidade::internal {
 
 using CameraJacobian = Eigen::Matrix<double, 2, kObservedCount>;
 
-// Image motion per row read out, in rows. Beyond this a landmark meets the read-out in no definite
-// row.
+// Downward image motion per row read out, in rows. Beyond this a landmark meets the read-out in no
+// definite row.
 inline constexpr double kMaxRowSlope = 0.9;
 
+// Of one state, which must outlive it.
 struct ObservationModel {
   const Camera<double> camera;
   const Mechanics<double>& mechanics;
@@ -34,11 +35,14 @@ struct ObservationModel {
         R_base_from_camera(state.mechanics, state.anchor, nullptr, &J_xi_axes_anchor);
   }
 
+  // A landmark's direction in the base, with its derivatives by the change of its direction and by
+  // those of the axes (rad).
   struct Landmark {
     Vector3<double> d_b;
     Matrix<double, 3, 2> J_db_landmark;
     Matrix<double, 3, 4> J_db_axes;
   };
+  // d_anchor: as in AdjustmentState::landmarks.
   [[nodiscard]] Landmark turn(const Vector3<double>& d_anchor) const {
     return {R_base_from_anchor * d_anchor, R_base_from_anchor * tangent_basis(d_anchor),
             -R_base_from_anchor * (skew(d_anchor) * J_xi_axes_anchor)};
@@ -46,7 +50,7 @@ struct ObservationModel {
 
   struct Result {
     Vector2<double> error;
-    Matrix2<double> J_angle;  // of the projection, like the following
+    Matrix2<double> J_angle;
     Matrix2<double> J_landmark;
     Vector2<double> J_nearness;
     CameraJacobian J_camera;
@@ -57,7 +61,9 @@ struct ObservationModel {
     }
   };
 
-  // Error and derivatives in units of sigma. row: if not null, its last four members too.
+  // Error (measured minus predicted) and derivatives of the prediction, in units of sigma. angle,
+  // rate: of the trajectory at the observed row. row: if not null, its last four members are set,
+  // too. False: there is no projection, or the motion is beyond kMaxRowSlope.
   [[nodiscard]] bool evaluate(const AdjustmentObservation& observation,
                               const PanTilt<double>& angle, const PanTilt<double>& rate,
                               const Landmark& landmark, double nearness, Result* out,
@@ -106,7 +112,7 @@ struct ObservationModel {
   }
 };
 
-// 0 where the state has none.
+// 0 if the state has none.
 [[nodiscard]] inline double nearness_of(const AdjustmentState& state, int landmark) {
   return state.nearness.empty() ? 0 : state.nearness[static_cast<std::size_t>(landmark)];
 }

@@ -23,7 +23,8 @@ struct RecordingClocks {
 
 [[nodiscard]] StreamTiming timing_of(const ClockLine& clock);
 
-// Sets frame_time_s, telemetry and reference_s of selected->data.
+// After select_input(). Sets frame_time_s, telemetry (with sigma 1) and reference_s of
+// selected->data.
 [[nodiscard]] RecordingClocks fit_clocks(const CalibrationInput& input,
                                          const CalibrationOptions& options,
                                          SelectedInput* selected);

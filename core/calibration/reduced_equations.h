@@ -1,11 +1,11 @@
 #pragma once
 // ReducedEquations: S x = b with S = H - Y Y^T (landmark_elimination.h) for long recordings. S is
-// dense where a path returns to a scene that was seen before; H and Y are sparse. Conjugate
-// gradients need only products with S. So time and memory grow with the observations, not with the
-// square or cube of the control points.
+// dense if a path returns to a scene that was seen before; H and Y are sparse. Conjugate gradients
+// need only products with S. So time and memory grow with the observations, not with the square or
+// cube of the control points.
 // Preconditioner: M = [B C^T; C D], with B the control points' block of H (a band, as if landmarks
-// were known), C and D the parameters' rows of S. B is larger than the same block of S, so M is
-// positive definite if S is. Some 20 to 40 steps at any length (docs/measurements.md).
+// were known), C and D the parameters' rows of S. B minus the same block of S is positive
+// semidefinite, so M is positive definite if S is. Takes some 20 to 40 steps at any length.
 // Allocates. Derivation: docs/calibration.md.
 
 #include <Eigen/Cholesky>
@@ -26,16 +26,18 @@ using OrderedCholesky =
 
 class ReducedEquations {
  public:
-  // Every diagonal element of H is multiplied by 1 + damping. `in` must outlive this object. False
-  // if M is not positive definite.
+  // Multiplies every diagonal element of H and of the landmarks' blocks by 1 + damping. `in` must
+  // outlive this object. False if a landmark's block or M is not positive definite.
   [[nodiscard]] bool set(const Linearisation& in, double damping);
 
+  // The right-hand side with landmarks eliminated: g - Y y.
   [[nodiscard]] const Eigen::VectorXd& g() const { return g_; }
   // The parameters' block of S.
   [[nodiscard]] const GlobalMatrix& parameters() const { return corner_; }
 
-  // b, x: as many rows as H. Iterates until the error is about `tolerance` times x, both by the
-  // norm x^T S x. False if this takes too many steps.
+  // After set() returned true. b, x: as many rows as H. Iterates until the error is about
+  // `tolerance` times x, both in the norm sqrt(x^T S x). False if this takes more than 200 steps,
+  // or if S turns out not to be positive definite.
   [[nodiscard]] bool solve(const Eigen::VectorXd& b, double tolerance, Eigen::VectorXd* x) const;
 
  private:

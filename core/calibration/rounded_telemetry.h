@@ -1,6 +1,6 @@
 #pragma once
-// Telemetry whose angles are multiples of a step (the resolution): what it measures, and with which
-// sigma. Angles rad, times s. Allocates. Derivation: docs/calibration.md.
+// Telemetry whose angles are rounded to a grid with a constant step (the resolution): what it
+// measures, and with which sigma. Angles rad, times s. Allocates. Derivation: docs/calibration.md.
 
 #include <cstddef>
 #include <vector>
@@ -9,23 +9,24 @@
 
 namespace alidade::internal {
 
-// The step of which all readings of an axis are multiples; the larger step of the two axes; 0 if
-// there is none.
+// The step of which all differences between readings of an axis are multiples, within 2 %; the
+// larger step of the two axes. 0: neither axis has one of 2e-7 rad or more.
 [[nodiscard]] double angle_resolution(const std::vector<AdjustmentTelemetry>& telemetry);
 
-// Sets each sample's sigma: white noise, rounding (resolution^2 / 12), and the stamp's error at the
-// smoothed rate.
+// Sets each sample's sigma: the root of the variances of white noise, rounding (resolution^2 / 12),
+// and the stamp's error at the rate of `smooth`, which is on the telemetry clock.
 void set_telemetry_sigma(double white_sigma, double resolution, double stamp_sigma_s,
                          const TrajectorySpline& smooth,
                          std::vector<AdjustmentTelemetry>* telemetry);
 
 // Removes the bias of rounding. While an axis moves by less than two steps from sample to sample,
 // rounding errors are not noise: the readings stay off to one side until the axis reverses. But
-// between two readings one step apart the axis passed their middle. This passage becomes a sample
-// at the middle of their times (trajectory time = telemetry time - shift_s). A run of equal
-// readings keeps the weight of one reading with sigma = resolution, enough to hold an axis that
-// nothing else holds. White noise of a quarter of the resolution or more dithers the readings: they
-// stay as they are. source[i]: index of the sample behind item i, of the first if there are two.
+// between two successive readings one step apart the axis passed their mean. This crossing is added
+// as a sample at the middle of their times; its sigma follows from the rate of `trajectory` (at
+// telemetry time - shift_s). Each of n equal readings in a row then has the sigma resolution
+// sqrt(n), which still holds an axis that nothing else holds. Nothing changes without a resolution,
+// for an axis without single steps, or if white_sigma is a quarter of the resolution or more.
+// source[i]: index of the sample of item i, of the first one for a crossing.
 [[nodiscard]] std::vector<AdjustmentTelemetry> add_crossings(
     const std::vector<AdjustmentTelemetry>& telemetry, double resolution, double white_sigma,
     const TrajectorySpline& trajectory, double shift_s, std::vector<std::size_t>* source);

@@ -2,8 +2,10 @@
 
 #include <Eigen/QR>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdio>
 #include <utility>
 #include <vector>
 
@@ -117,6 +119,19 @@ Shimmer find_shimmer(const AdjustmentData& data) {
   for (const AdjustmentObservation& o : data.observations) sigmas.push_back(o.sigma);
   out.stated_px = median(std::move(sigmas));
   return out;
+}
+
+std::string haze_text(const AdjustmentData& data, double sigma_ratio) {
+  const Shimmer shimmer = find_shimmer(data);
+  const double noise_px = shimmer.stated_px / sigma_ratio;
+  if (!shimmer.is_haze(noise_px)) return {};
+  std::array<char, 300> text{};
+  std::snprintf(text.data(), text.size(),
+                ": haze: points of the pictures move to and fro against their neighbours by %.2g "
+                "px within 0.4 s, %.0f times the tracks' noise; record when the ground is cool, or "
+                "things that are nearer",
+                shimmer.rms_px, shimmer.rms_px / noise_px);
+  return text.data();
 }
 
 }  // namespace alidade::internal

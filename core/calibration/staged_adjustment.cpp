@@ -145,7 +145,7 @@ StageStatus StagedAdjustment::adjust_on_inliers(CalibrationQuality* quality) {
   }
   quality->steps = adjustment_.steps_taken();
   if (!converged) {
-    const std::string haze = haze_text(*quality);
+    const std::string haze = haze_text(selected_->data, quality->pixel_sigma_ratio);
     return {CalibrationStatus::kNotConverged,
             "the adjustment does not converge" +
                 (haze.empty() ? ": the model does not describe these data; is the image's size "
@@ -155,7 +155,8 @@ StageStatus StagedAdjustment::adjust_on_inliers(CalibrationQuality* quality) {
   }
   if (!hold_centre()) {
     return {CalibrationStatus::kNotConverged,
-            "the adjustment does not converge with the optical centre held" + haze_text(*quality)};
+            "the adjustment does not converge with the optical centre held" +
+                haze_text(selected_->data, quality->pixel_sigma_ratio)};
   }
   StageStatus status = allow_for_repetition(quality);
   if (!status.ok()) return status;
@@ -180,20 +181,6 @@ StageStatus StagedAdjustment::adjust_on_inliers(CalibrationQuality* quality) {
   release_centre();
   adjusted_.covariance += hidden_;
   return {};
-}
-
-// Continues a refusal; empty if the pictures do not shimmer.
-std::string StagedAdjustment::haze_text(const CalibrationQuality& quality) const {
-  const Shimmer shimmer = find_shimmer(selected_->data);
-  const double stated_px = shimmer.stated_px / quality.pixel_sigma_ratio;
-  if (!shimmer.is_haze(stated_px)) return {};
-  std::array<char, 300> text{};
-  std::snprintf(text.data(), text.size(),
-                ": haze: points of the pictures move to and fro against their neighbours by %.2g "
-                "px within 0.4 s, %.0f times the tracks' noise; record when the ground is cool, or "
-                "things that are nearer",
-                shimmer.rms_px, shimmer.rms_px / stated_px);
-  return text.data();
 }
 
 bool StagedAdjustment::settle_robustly() {
@@ -386,16 +373,18 @@ StageStatus StagedAdjustment::allow_for_repetition(CalibrationQuality* quality) 
   quality->repetition =
       std::max(1.0, repetition(data, adjusted_.state.landmarks.size(), adjusted_.at));
   if (quality->repetition < kChance) return {};
-  for (auto& o : data.observations) o.sigma *= std::sqrt(quality->repetition);
+  const double wider = std::sqrt(quality->repetition);
+  for (auto& o : data.observations) o.sigma *= wider;
   if (!adjustment_.minimise({}, 20, 1e-4, &adjusted_.state, &adjusted_.at) ||
       !adjustment_.covariance(adjusted_.at, &adjusted_.covariance, &telemetry_unknowns_)) {
     return {CalibrationStatus::kNotConverged,
             "the adjustment does not converge with errors that repeat from frame to frame" +
-                haze_text(*quality)};
+                haze_text(data, quality->pixel_sigma_ratio * wider)};
   }
   if (departs_ && !settle_known_departures()) {
     return {CalibrationStatus::kNotConverged,
-            "the adjustment does not converge with the telemetry's errors" + haze_text(*quality)};
+            "the adjustment does not converge with the telemetry's errors" +
+                haze_text(data, quality->pixel_sigma_ratio * wider)};
   }
   return {};
 }

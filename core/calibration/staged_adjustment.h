@@ -28,33 +28,35 @@ struct Adjusted {
 
 class StagedAdjustment {
  public:
-  // *selected must outlive this object. The adjustment sets outliers, noise and crossings in it and
-  // subtracts departures from its telemetry.
+  // *selected must outlive this object. The adjustment removes drifting landmarks from it, sets
+  // outliers, noise and crossings, and subtracts departures from its telemetry.
   // nearness_sigma: of the prior of each landmark's nearness (AdjustmentState); 0: none has any.
   StagedAdjustment(const StartValues& start, const TelemetryAngleNoise& noise,
                    const CalibrationOptions& options, double nearness_sigma,
                    SelectedInput* selected);
 
   // Cauchy loss, whose scale follows the medians of the residuals, down to 3 sigmas. Splits
-  // segments of the spline if the residuals ask for it (knot_choice.h). Leaves out what drifts, and
-  // begins anew if anything does (drifting_tracks.h). Then replaces rounded telemetry by its
-  // crossings (rounded_telemetry.h), which need a trajectory that is already close. Subtracts the
-  // departures that telemetry shows (telemetry_departures.h). Marks outliers at the end.
+  // segments of the spline if the residuals ask for it (knot_choice.h). Leaves out what drifts
+  // (drifting_tracks.h). Begins anew if anything does, and to add nearness. Then replaces rounded
+  // telemetry by its crossings (rounded_telemetry.h), which need a trajectory that is already
+  // close. Subtracts the departures that telemetry shows (telemetry_departures.h). Marks outliers
+  // at the end.
   void adjust_robustly();
 
-  // Least squares on the rest, as a robust loss on good data would inflate the sigmas. Outliers are
-  // marked again. Noise levels that the residuals contradict beyond chance are replaced by the
-  // residuals' (noise_check.h). The covariance grows if residuals move the parameters together
-  // (shared_errors.h), and if parts of the recording contradict each other (contradictions.h); the
-  // optical centre is held meanwhile (centre_share.h). The focal length's share grows by what all
-  // distances have in common (common_nearness.h); a stated scene that the pictures contradict is
-  // bad input. Sets the quality's steps, ratios, repetition and contradiction. After
-  // adjust_robustly().
+  // After adjust_robustly(). Least squares on the rest, as a robust loss on good data would inflate
+  // the sigmas; outliers are marked again. Noise levels that the residuals contradict are replaced
+  // by theirs (noise_check.h). The covariance grows by errors that observations share
+  // (shared_errors.h), contradictions between parts (contradictions.h), their causes (departures.h)
+  // and what all distances have in common (common_nearness.h); the optical centre is held meanwhile
+  // (centre_share.h). Refuses: kTelemetryMismatch (drift, or errors that no gear has), kWeak
+  // (undetermined), kNotConverged, kBadInput (the pictures contradict the stated scene). Sets
+  // steps, ratios, repetition, contradiction and causes of *quality.
   [[nodiscard]] StageStatus adjust_on_inliers(CalibrationQuality* quality);
 
   // After adjust_on_inliers() returned ok.
   [[nodiscard]] const Adjusted& adjusted() const { return adjusted_; }
-  // What adjust_on_inliers() saw of different distances, where nearness_sigma is 0; 0: nothing.
+  // If different distances are the likeliest cause that adjust_on_inliers() found, the standard
+  // deviation of the landmarks' nearness; else, and if nearness_sigma is not 0: 0.
   [[nodiscard]] double seen_nearness() const { return seen_nearness_; }
   // The number of observations that were left out because they drift.
   [[nodiscard]] int drifting() const { return drifting_; }
@@ -71,7 +73,6 @@ class StagedAdjustment {
   void replace_rounded_telemetry();
   bool mark_outliers();
   bool correct_noise(CalibrationQuality* quality);
-  [[nodiscard]] std::string haze_text(const CalibrationQuality& quality) const;
   [[nodiscard]] bool hold_centre();
   void release_centre();
   [[nodiscard]] StageStatus allow_for_repetition(CalibrationQuality* quality);
@@ -91,9 +92,9 @@ class StagedAdjustment {
   AdjustmentState start_;
   double telemetry_unknowns_ = 0;
   CentreShare<kGlobalCount> centre_;
-  Mechanics<double> axes_held_;                      // whose tangent bases centre_ is told in
+  Mechanics<double> axes_held_;                      // in whose tangent bases centre_ is
   GlobalMatrix centre_held_ = GlobalMatrix::Zero();  // covariance before it grew
-  GlobalMatrix hidden_ = GlobalMatrix::Zero();       // Departures
+  GlobalMatrix hidden_ = GlobalMatrix::Zero();       // Departures::hidden
   bool settled_ = false;                             // by settle_robustly()
   DriftFinding drift_ = DriftFinding::kNone;
   double drift_px_s_ = 0;

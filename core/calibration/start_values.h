@@ -1,10 +1,10 @@
 #pragma once
-// Third and fourth stage of calibrate(): start values for the adjustment, from the data alone.
+// Third and fourth stage of calibrate(): start values for the adjustment, from data and priors.
 //   find_motion    smooths and weighs telemetry and matches it with the image's motion. Finds clock
 //                  offset and focal length, or says why there are none
 //   start_values   leaves out what lies outside the other stream's time span. Sets the trajectory
 //                  from telemetry, landmarks as medians of their observed directions, and priors
-//                  (adjustment_priors.h)
+//                  (adjustment_priors.h). A focal length that is known exactly is taken
 // Allocates.
 
 #include <string>
@@ -20,7 +20,7 @@ namespace alidade::internal {
 // Errors of the telemetry's angles.
 struct TelemetryAngleNoise {
   double resolution_rad = 0;   // 0: angles are not rounded
-  double white_sigma_rad = 0;  // of the noise beside the rounding
+  double white_sigma_rad = 0;  // of the noise in addition to the rounding
 };
 
 struct MotionStart {
@@ -28,8 +28,9 @@ struct MotionStart {
   MotionMatch match;
 };
 
-// Unwraps selected->data.telemetry and sets its sigmas. After a refusal, *motion still has the
-// match.
+// After fit_clocks(). Unwraps selected->data.telemetry and sets its sigmas. Refuses telemetry that
+// no smooth motion fits (bad input; *motion stays), and what check_motion() (sufficiency.h) refuses
+// (*motion then has noise and match).
 [[nodiscard]] StageStatus find_motion(const CalibrationInput& input,
                                       const CalibrationOptions& options,
                                       const RecordingClocks& clocks, SelectedInput* selected,
@@ -38,17 +39,21 @@ struct MotionStart {
 struct StartValues {
   PriorKnowledge prior;
   AdjustmentState state;
-  std::string doubt;  // a question for the user if the adjustment fails (ask_for_degrees())
+  std::string doubt;  // ask_for_degrees(): for the message if the adjustment does not converge
 };
 
+// match: of find_motion(), ok. Removes observations, landmarks and telemetry samples outside the
+// other stream's span from *selected, and counts them in *excluded. Refuses (bad input) if fewer
+// than kMinLandmarks landmarks or 8 telemetry samples are left.
 [[nodiscard]] StageStatus start_values(const CalibrationInput& input,
                                        const CalibrationOptions& options,
                                        const RecordingClocks& clocks, const MotionMatch& match,
                                        SelectedInput* selected, CalibrationExclusions* excluded,
                                        StartValues* start);
 
-// Sets state->landmarks (camera frame at the anchor) from the state's camera, mechanics and
-// trajectory: medians of the directions of their observations, component by component.
+// Sets state->landmarks, whose number stays, from the state's camera, mechanics, trajectory and
+// anchor: the normalised median, component by component, of the directions of each one's
+// observations (camera frame at the anchor). A landmark without any gets an arbitrary direction.
 void initialise_landmarks(const AdjustmentData& data, AdjustmentState* state);
 
 }  // namespace alidade::internal

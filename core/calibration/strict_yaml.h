@@ -45,7 +45,7 @@ struct NotYaml {
 };
 
 // Hands the parsed text to `read`, which may throw YamlError. False and one line in *error if
-// `read` threw, or if the text is not YAML. name stands for the file in errors.
+// `read` threw it, or if the text is not YAML. name stands for the file in errors.
 [[nodiscard]] bool read_yaml(const std::string& text, const std::string& name,
                              const NotYaml& not_yaml,
                              const std::function<void(const YAML::Node&)>& read,

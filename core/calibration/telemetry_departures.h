@@ -27,15 +27,15 @@ class TelemetryDepartures {
                                double accuracy = 0)
       : fixed_(fixed), resolution_(resolution), accuracy_(accuracy) {}
 
-  // Estimates the departures in full. state, at: the minimum of least squares with the readings as
-  // they are in `data`, the latest estimate subtracted. choose: the parts that are present are
-  // chosen anew; else the parts stay. False if no part is present and no accuracy is claimed, or if
-  // nothing can be estimated.
+  // Estimates the departures in full. data: the same samples in all calls. state, at: the minimum,
+  // robust or not, with the readings as they are in `data`, the latest estimate subtracted. choose:
+  // the parts that are present are chosen anew; else they stay, but ripples are refined. False if
+  // no part is present and no accuracy is claimed, or if the normal equations have no solution.
   [[nodiscard]] bool estimate(const AdjustmentData& data, const AdjustmentState& state,
                               const Linearisation& at, bool choose, Adjustment* adjustment);
 
-  // Sets the readings to the original ones minus the departures. Sets the sigmas to the original
-  // ones, larger where the state of the play is not known.
+  // After estimate(). Sets the readings to the original ones minus the departures. Sets the sigmas
+  // to the original ones, larger where the state of the play is not known.
   void subtract(const AdjustmentState& state, const Linearisation& at, AdjustmentData* data);
 
   // The adjustment now takes this parameter as exact.
@@ -44,7 +44,7 @@ class TelemetryDepartures {
   // The readings' sigmas were multiplied by this.
   void scale_noise(double ratio);
 
-  // By how many standard deviations the latest estimate differs from what was subtracted.
+  // By how many standard deviations the latest estimate differs from what was subtracted before it.
   [[nodiscard]] double change() const { return change_; }
   // The number of unknowns that the telemetry determines here.
   [[nodiscard]] double unknowns() const { return fit_.unknowns; }

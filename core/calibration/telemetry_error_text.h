@@ -15,7 +15,7 @@
 
 namespace alidade::internal {
 
-// Throws YamlError.
+// Throws YamlError. Without a key its part of the result does not exist().
 [[nodiscard]] TelemetryError read_telemetry_error(const EstimateReader& file);
 // Writes the keys that are needed into a map.
 void write_telemetry_error(const TelemetryError& error, YAML::Emitter* out);

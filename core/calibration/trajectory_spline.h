@@ -1,6 +1,7 @@
 #pragma once
-// TrajectorySpline: pan and tilt over time as a CubicSpline. Its control points are (pan, tilt):
-// rad, true angles, not wrapped. Positions and rates are exact.
+// TrajectorySpline: pan and tilt over time as a CubicSpline. Its control points are (pan, tilt) in
+// rad, not wrapped; rates in rad/s. Usually true angles on the image clock; where telemetry is
+// fitted (fit_telemetry()), measured angles.
 
 #include "core/model/angle.h"
 #include "core/model/cubic_spline.h"

@@ -52,7 +52,8 @@ struct ZoomCurveParts {
   bool clock_is_another = false;
   std::vector<int> places;  // sample indices that are not exact
 };
-// Sets *evidence without its marginals. False: the covariance is not positive definite.
+// Sets *evidence without its marginals. False: the curve's covariance is not positive definite over
+// the places.
 [[nodiscard]] bool take_apart(const ZoomCurve& curve, const ZoomCurveParts& parts,
                               ZoomEvidence* evidence);
 // Adds a node without information, after the nodes of equal reading, and returns its index. The

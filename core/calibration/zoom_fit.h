@@ -43,7 +43,7 @@ struct ZoomFitOptions {
   // s; standard deviation of an error that all clock offsets share. More calibrations do not
   // average it out: it stays in the curve's clock offset.
   double common_clock_sigma_s = 0;
-  // extend_zoom(): the curve's clock offset is of another connection.
+  // Only for extend_zoom(): the curve's clock offset is of another connection.
   bool clock_is_another = false;
   // Limit of the chi-square's excess over its expectation, in standard deviations of the
   // chi-square. Beyond it, the calibrations are of two cameras.
@@ -62,10 +62,12 @@ struct ZoomFit {
   int node = 0;                // extend_zoom(): the node of the added calibration
 };
 
-// calibrations: at two or more readings, each with its zoom. All must take the same parameters as
-// exact: axes beside a free optical centre cannot be compared with axes beside an exact one. False
-// and one line in *error that names the calibration: readings of two cameras (shared parameters
-// differ beyond chance), or a focal length that is not monotone in the reading.
+// calibrations: at two or more readings, each with its zoom, of one image size. All must take the
+// same parameters as exact: axes beside a free optical centre cannot be compared with axes beside
+// an exact one. False and one line in *error: calibrations that do not meet this, or more than
+// ZoomCurve::kMaxNodes; a covariance that is not positive definite; readings of two cameras (shared
+// parameters differ beyond chance); one reading with two focal lengths, or a focal length that is
+// not monotone in the reading. *fit then means nothing.
 [[nodiscard]] bool fit_zoom(const std::vector<Calibration>& calibrations,
                             const ZoomFitOptions& options, ZoomFit* fit, std::string* error);
 
@@ -92,7 +94,8 @@ struct ZoomFit {
                                std::optional<int> visit, const ZoomFitOptions& options,
                                ZoomFit* fit, std::string* error);
 
-// Computes Content::inverse from the other members. False if two nodes are too close for it.
+// Computes Content::inverse from the other members. False if two nodes are too close for it; the
+// inverses then mean nothing.
 [[nodiscard]] bool set_inverses(ZoomCurve::Content* content);
 
 }  // namespace alidade

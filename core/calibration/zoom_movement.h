@@ -25,7 +25,7 @@ struct ZoomMovement {
   StampNoise image_stamps = StampNoise::kSymmetric;  // as in CalibrationOptions
   StampNoise telemetry_stamps = StampNoise::kSymmetric;
   std::vector<ZoomReading> readings;  // on the telemetry clock
-  ZoomStretch from;                   // the dwells before
+  ZoomStretch from;                   // the dwells before, on the telemetry clock,
   ZoomStretch to;                     // and after it
 };
 
@@ -40,22 +40,23 @@ struct MovementObservation {
   Eigen::MatrixXd covariance;
   Eigen::VectorXd rate_per_s;    // d log f / dt: the effect of a time error
   double pixel_sigma_ratio = 0;  // RMS of residuals over their sigmas
-  int frames = 0;                // counts of what was used
-  int landmarks = 0;
+  int frames = 0;                // with tracks, outliers included
+  int landmarks = 0;             // likewise
 };
 
-// Movements longer than this are left out.
+// observe_movement() refuses longer movements.
 inline constexpr double kLongestMovement_s = 20;
 
 // curve: covers at least the dwells. readings: at which log f is wanted; those that were passed
 // while landmarks were followed are observed. The caller sets from and to of the observation. False
-// and one line in *error: why nothing can be observed.
+// and one line in *error, why nothing can be observed; *observation is then empty.
 [[nodiscard]] bool observe_movement(const ZoomMovement& movement, const ZoomCurve& curve,
                                     const std::vector<double>& readings,
                                     MovementObservation* observation, std::string* error);
 
-// The movements between consecutive dwells. input, readings: of a whole recording. rests: the
-// dwells, in order of time (find_zoom_stretches()).
+// The movements between consecutive dwells whose readings differ. input, readings: of a whole
+// recording. rests: the dwells, in order of time (find_zoom_stretches()). The caller sets the kinds
+// of stamps.
 [[nodiscard]] std::vector<ZoomMovement> find_movements(const CalibrationInput& input,
                                                        const std::vector<ZoomReading>& readings,
                                                        const std::vector<ZoomStretch>& rests);

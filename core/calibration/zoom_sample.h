@@ -41,8 +41,8 @@ struct ZoomSample {
                                         ZoomSample* sample);
 
 // Subtracts common_sigma_s^2 from the variance of the clock offset: the clock error that all
-// telemetry polls share does not belong to a single calibration. Subtracts less where the
-// covariance would not stay positive. places: rows of *covariance that are not exact. clock: the
+// telemetry polls share does not belong to a single calibration. Subtracts less if the covariance
+// would not stay positive definite. places: rows of *covariance that are not exact. clock: the
 // row of *covariance for the clock offset. Nothing happens if the clock's row is exact or the
 // covariance is not positive definite.
 void take_common_clock_error(const std::vector<int>& places, int clock, double common_sigma_s,

@@ -26,7 +26,7 @@ class ZoomSolution {
   [[nodiscard]] ZoomSampleVector left_of(const ZoomSample& sample, int node) const;
   // The number of shared parameters among `places`.
   [[nodiscard]] int shared_places() const;
-  // After run(). False and one line in *error: the focal length is not monotone.
+  // After run(). False and one line in *error: the focal length is not monotone in the reading.
   [[nodiscard]] bool curve(ZoomCurve* curve, std::string* error) const;
 
  private:

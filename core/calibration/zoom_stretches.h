@@ -1,7 +1,7 @@
 #pragma once
 // find_zoom_stretches(): the dwells of a recording, during which the zoom reading is constant.
-// Readings that return to the dwell's within glitch_s are a glitch and do not end the dwell. Pure;
-// allocates.
+// Readings that return to the dwell's within glitch_s are a glitch and do not end the dwell; nor
+// does a gap between readings. Pure; allocates.
 
 #include <vector>
 

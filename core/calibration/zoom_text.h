@@ -18,8 +18,8 @@
 
 namespace alidade::internal {
 
-// shared: the file's calibration, which provides image size and shared parameters. Throws
-// YamlError.
+// node: the value of the key zoom_curve. shared: the file's calibration, which provides image size
+// and shared parameters. Throws YamlError.
 [[nodiscard]] ZoomCurve read_zoom_curve(const EstimateReader& file, const YAML::Node& node,
                                         const Calibration& shared);
 // Writes it as the value of a key.

@@ -8,6 +8,7 @@
 
 namespace alidade::internal {
 
+// px; the larger side.
 [[nodiscard]] inline double size_of(const DetectionBox& box) {
   return std::max(box.width, box.height);
 }

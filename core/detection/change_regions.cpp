@@ -205,17 +205,18 @@ bool ChangeRegions::find() {
   std::size_t above = 0;
   std::size_t above_end = 0;
   std::int64_t pixels = 0;
-  for (int v = kHalf; v + kHalf < height_; ++v) {
+  bool fits = true;
+  for (int v = kHalf; fits && v + kHalf < height_; ++v) {
     sum_rows(v);
     const std::size_t here = runs_.size();
-    if (!find_runs(v)) return false;
+    fits = find_runs(v);
+    for (std::size_t i = here; i < runs_.size(); ++i) pixels += runs_[i].to - runs_[i].from;
     join(above, above_end, here);
     above = here;
     above_end = runs_.size();
-    for (std::size_t i = here; i < runs_.size(); ++i) pixels += runs_[i].to - runs_[i].from;
   }
   changed_ = static_cast<double>(pixels) / (static_cast<double>(width_) * height_);
-  if (!make_regions()) return false;
+  if (!fits || !make_regions()) return false;
   merge_regions();
   make_boxes();
   return true;

@@ -16,12 +16,13 @@
 namespace alidade {
 
 struct ChangeOptions {
-  double threshold = 6.5;    // sigmas of S
-  double merge_px = 6;       // boxes that are no farther apart are merged
-  double least_size_px = 1;  // of a box, in its larger direction
-  double most_size_px = 200;
-  int most_boxes = 64;  // of these the surest are kept
+  double threshold = 6.5;     // sigmas of S
+  double merge_px = 6;        // boxes that are no farther apart are merged
+  double least_size_px = 1;   // of a box, in its larger direction; others are left out
+  double most_size_px = 200;  // likewise
+  int most_boxes = 64;        // the surest are kept
 
+  // False if a value is invalid. *error, if not null, then says which in one line.
   [[nodiscard]] bool validate(const char** error = nullptr) const;
 };
 
@@ -53,7 +54,7 @@ class ChangeRegions {
 
   // Surest first.
   [[nodiscard]] const std::vector<DetectionBox>& boxes() const { return boxes_; }
-  // Share of all pixels beyond the threshold.
+  // Share of all pixels beyond the threshold; if there is no room, of those until then.
   [[nodiscard]] double changed() const { return changed_; }
 
   [[nodiscard]] std::size_t memory_bytes() const;

@@ -23,10 +23,11 @@ class EarlierFrames {
   static constexpr int kMost = kRecent + kLadder;
 
   struct Frame {
-    std::vector<std::uint8_t> pixels;  // row by row
+    std::vector<std::uint8_t> pixels;  // grey levels, row by row
     FrameOrientation orientation;
   };
 
+  // width, height: px. spacing_s: s, >= 0.
   EarlierFrames(int width, int height, double spacing_s);
 
   void clear();
@@ -37,6 +38,7 @@ class EarlierFrames {
   // Sets the order of preference for an image of this time. To be called before preferred() and
   // view().
   void order_for(double time_s);
+  // i: 0 to size() - 1; 0 is preferred most.
   [[nodiscard]] const Frame& preferred(int i) const {
     return frames_[static_cast<std::size_t>(order_[static_cast<std::size_t>(i)])];
   }
@@ -45,6 +47,7 @@ class EarlierFrames {
   [[nodiscard]] ImageView view(int i) const {
     return {preferred(i).pixels.data(), width_, height_, width_};
   }
+  // True if this time is later than those of all frames.
   [[nodiscard]] bool after_all(double time_s) const {
     return recent_.count == 0 || time_s > time_of(recent_.slots[0]);
   }

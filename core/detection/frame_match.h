@@ -5,7 +5,7 @@
 //   r = 2 u_v / height - 1: -1 in the first row, 1 in the last
 //   V(u) = 1 + falloff |u - middle|^2 / (half diagonal)^2
 // Shift and shear: errors of orientation and rates that the frames do not share, up to a pixel or
-// two where there is texture; 0 in directions without texture. V: lenses are darker at the corners,
+// two if there is texture; 0 in directions without texture. V: lenses are darker at the corners,
 // where the scene passes as the camera turns. Moving things are outliers. No allocation.
 
 #include <algorithm>
@@ -18,7 +18,7 @@
 
 namespace alidade {
 
-// The current picture, smoothed (spline_image.h).
+// The current image, smoothed (spline_image.h): row by row, in 1/kSmoothUnit grey level.
 struct SmoothedView {
   const std::uint16_t* pixels = nullptr;
   int width = 0;
@@ -29,14 +29,14 @@ struct SmoothedView {
   }
 };
 
-// Variance (grey levels^2) of the difference of two smoothed pictures of a scene without motion:
+// Variance (grey levels^2) of the difference of two smoothed images of a scene without motion:
 //   noise^2 + (shift |gradient|)^2 + (blur |second derivative|)^2
 struct DifferenceModel {
   float noise_square = 1;  // grey levels^2
   float shift_square = 0;  // px^2
   float blur_square = 0;   // px^4
 
-  // At pixel u, from three rows of a smoothed picture.
+  // At pixel u, from three rows of a SmoothedView; u - 1 and u + 1 must exist.
   [[nodiscard]] float variance(const std::uint16_t* above, const std::uint16_t* here,
                                const std::uint16_t* below, int u) const {
     constexpr float kUnitSquare = 1.0F / (36 * 36);
@@ -50,7 +50,7 @@ struct DifferenceModel {
 };
 
 struct FrameMatch {
-  Vector2<double> shift = Vector2<double>::Zero();  // px, in the earlier picture
+  Vector2<double> shift = Vector2<double>::Zero();  // px, in the earlier image
   Vector2<double> shear = Vector2<double>::Zero();  // px
   double gain = 1;
   double offset = 0;   // grey levels
@@ -72,7 +72,7 @@ struct FrameMatch {
 // r of the middle of a row of pixels.
 [[nodiscard]] inline double row_place(int v, int height) { return (2.0 * v + 1) / height - 1; }
 
-// Squared distance from a picture's middle, over that of its corners.
+// Squared distance from an image's middle, over that of its corners.
 class CornerDistance {
  public:
   CornerDistance(int width, int height)
@@ -90,7 +90,8 @@ class CornerDistance {
   float middle_u_, middle_v_, scale_;
 };
 
-// scratch: room for two floats a tile.
+// warp: corners of columns x rows tiles (frame_warp.h). scratch: room for one float a tile. If no
+// sample is in the earlier image, samples is 0, and the rest is not to be used.
 [[nodiscard]] FrameMatch match_frames(const SmoothedView& now, const ImageView& then,
                                       const TileCorners& warp, int columns, int rows,
                                       const DifferenceModel& model, std::vector<float>* scratch);

@@ -23,7 +23,7 @@ using TileCorners = std::vector<TileCorner>;
 
 class FrameWarp {
  public:
-  // width, height: of the pictures; at least kTile.
+  // width, height: px, of the images; at least kTile.
   FrameWarp(int width, int height);
 
   [[nodiscard]] int columns() const { return columns_; }  // of tiles; the last may reach beyond
@@ -32,10 +32,11 @@ class FrameWarp {
     return static_cast<std::size_t>(columns_ + 1) * static_cast<std::size_t>(rows_ + 1);
   }
 
-  // Sets the current frame. False: a pixel has no direction.
+  // Sets the current frame. False: a node has no direction.
   [[nodiscard]] bool look(const FrameOrientation& now);
   // Where the current frame's pixels are in an earlier frame; they may lie outside its image. out:
-  // corners() elements. False: the direction of a node has no pixel in the earlier frame.
+  // corners() elements. False: the direction of a node has no pixel in the earlier frame; *out is
+  // then unchanged. Needs look().
   [[nodiscard]] bool to(const FrameOrientation& then, TileCorners* out);
 
  private:

@@ -36,13 +36,14 @@ struct MotionOptions {
   double most_changed = 0.1;   // of the picture
   ChangeOptions change;
 
+  // False if a value is invalid. *error, if not null, then says which in one line.
   [[nodiscard]] bool validate(const char** error = nullptr) const;
 };
 
 enum class MotionStatus {
   kOk,
   kWrongImage,     // no picture, or its size is not that of options and calibration
-  kNoOrientation,  // mode none, or its numbers are not finite or describe no camera
+  kNoOrientation,  // mode none, numbers not finite or of no camera, or pixels without a direction
   kNotNewer,       // not newer than the picture before
   kBlurred,        // the camera turns too fast for the exposure
   // Too little of the image was seen before: at the beginning, after a jump or a change of zoom.
@@ -58,7 +59,7 @@ struct MotionAnswer {
   double covered = 0;   // share of the picture in which motion can be found
   double shift_px = 0;  // largest error of the compared pictures' orientations
   double spread = 0;    // largest spread of differences over the expected one; 1: as expected
-  double changed = 0;   // share of the picture
+  double changed = 0;   // share of the picture beyond the threshold (ChangeRegions::changed())
 };
 
 class MotionDetector {

@@ -25,23 +25,23 @@ struct NetworkOptions {
   int most_boxes = 64;              // the surest
   std::vector<std::string> labels;  // of classes 0, 1, ...; empty: numbers are used
 
+  // False if a value is invalid. *error, if not null, then says which in one line.
   [[nodiscard]] bool validate(const char** error = nullptr) const;
 };
 
 enum class NetworkStatus {
   kOk,
-  kNoImage,  // not valid
-  kFailed    // the network's output has changed since the start
+  kNoImage,  // not valid, or stored bottom up
+  kFailed    // OpenCV could not run the network, or its output has another shape than at first
 };
 
 class NetworkDetector {
  public:
-  // model: the bytes of a file. options must be valid. Runs once on an empty image. N tells the
-  // output's kind: v8 has one candidate for each cell of grids with strides 8, 16 and 32, v5 has
-  // three. With another N, the larger dimension is taken for the candidates, the smaller one for
-  // the values. (An export with NMS, 1 x N x 6, looks like v5's.) Null and one line in *error: not
-  // an ONNX network, another input or output, boxes not in pixels, or a different number of
-  // classes.
+  // model: the bytes of a file. options must be valid. Runs once on an empty image. The output's
+  // kind follows from N: v8 has one candidate for each cell of grids with strides 8, 16 and 32, v5
+  // has three. With another N, the larger dimension is taken for the candidates, the smaller one
+  // for the values. (An export with NMS, 1 x N x 6, looks like v5's.) Null and one line in *error:
+  // not an ONNX network, another input or output, boxes not in pixels, or labels of another number.
   [[nodiscard]] static std::unique_ptr<NetworkDetector> load(const std::string& model,
                                                              const NetworkOptions& options,
                                                              std::string* error);
@@ -50,7 +50,7 @@ class NetworkDetector {
   NetworkDetector& operator=(const NetworkDetector&) = delete;
 
   [[nodiscard]] NetworkStatus find(const ImageView& image);
-  // Of the latest picture, surest first.
+  // Of the latest picture, surest first; empty unless its status was kOk.
   [[nodiscard]] const std::vector<DetectionBox>& boxes() const { return boxes_; }
   [[nodiscard]] int classes() const;
 

@@ -20,7 +20,7 @@ namespace alidade {
 
 struct PersonOptions {
   double height_m = 1.75;         // of people
-  double height_tolerance = 0.2;  // largest |log(a person's height / height_m)|
+  double height_tolerance = 0.2;  // largest |log(a box's height / that of height_m there)|
   double height_step = 1.1;       // largest ratio of heights in px within a band; > 1
   double least_height_px = 48;
   double most_height_px = 480;
@@ -28,12 +28,13 @@ struct PersonOptions {
   double most_overlap = 0.45;  // of two boxes that both stay
   int most_boxes = 64;
 
+  // False if a value is invalid. *error, if not null, then says which in one line.
   [[nodiscard]] bool validate(const char** error = nullptr) const;
 };
 
 enum class PersonStatus {
   kOk,
-  kNoImage,        // not valid, or its size is not the calibration's
+  kNoImage,        // not valid, stored bottom up, or its size is not the calibration's
   kNoOrientation,  // mode none
   // Everywhere people would be too small or too large, or no ground is in view.
   kNowhere
@@ -53,7 +54,7 @@ class PersonDetector {
                                   const WorldPlane& plane);
   // For comparison: any height from least to most, in steps of 5 %, anywhere.
   [[nodiscard]] PersonStatus find_at_all_scales(const ImageView& image);
-  // Of the latest picture, surest first.
+  // Of the latest picture, surest first; empty unless its status was kOk.
   [[nodiscard]] const std::vector<DetectionBox>& boxes() const { return boxes_; }
 
  private:

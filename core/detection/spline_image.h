@@ -1,8 +1,8 @@
 #pragma once
-// Pictures smoothed by the cubic B-spline (sampling.h). The blur is nearly the same at pixel
-// centres and between them. So two pictures can be compared at any fraction of a pixel without
-// interpolation errors, to 0.001 px. The variance of white noise falls to 0.46 to 0.5 of itself in
-// each direction.
+// Images smoothed by the cubic B-spline (sampling.h). The blur is nearly the same at pixel centres
+// and between them. So two images can be compared at any fraction of a pixel without interpolation
+// errors, to 0.001 px. The variance of white noise falls to 0.46 to 0.5 of itself in each
+// direction.
 //   smooth_image   at all pixel centres: weights (1 4 1) / 6 both ways, exact, in 1/36 grey level
 //   spline_value   anywhere, with weights for the nearest 1/64 px
 
@@ -26,7 +26,8 @@ extern const std::array<std::array<float, 4>, kSplineSteps + 1> kSplineWeights;
 
 }  // namespace internal
 
-// out: width * height, row by row. The outermost pixels are not smoothed.
+// image: valid, at least 2 px wide. out: width * height values, row by row. The first and last row
+// are smoothed along the row only, the first and last column not at all.
 void smooth_image(const ImageView& image, std::uint16_t* out);
 
 // In grey levels. u, v: at least kSplineMargin from every edge.

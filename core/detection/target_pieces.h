@@ -2,10 +2,11 @@
 // join_target_pieces(): a target that is large for its speed changes the image only along its
 // outline: its inside, of one grey level, covers itself in the earlier images. So pieces of the
 // outline are found around an unchanged inside. In at least one piece most changed pixels have the
-// grey level of the inside. Two boxes belong to one target if
+// grey level of the inside. Two boxes belong to one target if they are no farther apart than
+// merge_px, or at most twice the larger one's size and
 //   |g - m| < c / 3   for three quarters of the pixels between the boxes, and
 //   |g - m| < c / 2   for most changed pixels of one of the boxes
-// g: grey level, m: its median on the line between the boxes' middles, c: mean change of the box's
+// g: grey level, m: its median on the line between the boxes' middles, c: mean change of that box's
 // changed pixels. Conditions and limits: docs/derivations.md.
 
 #include <vector>

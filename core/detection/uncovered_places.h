@@ -1,5 +1,5 @@
 #pragma once
-// drop_uncovered_places(): a large, slow target whose earlier places overlap changes the picture
+// drop_uncovered_places(): a large, slow target whose earlier places overlap changes the image
 // twice: at its front, and behind it, where the scene reappears. The second change is no target. If
 // no earlier image shows the target elsewhere, the present one decides: one of the two places
 // became brighter, the other darker, and the target is between them. With a, b mean grey levels of

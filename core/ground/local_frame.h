@@ -25,6 +25,7 @@ class LocalFrame {
   [[nodiscard]] const GeodeticPosition& origin() const { return origin_; }
   // m: east, north, up.
   [[nodiscard]] Vector3<double> local(const GeodeticPosition& position) const;
+  // The inverse. Longitude -pi to pi; on the Earth's axis that of the origin.
   [[nodiscard]] GeodeticPosition geodetic(const Vector3<double>& local_m) const;
 
  private:

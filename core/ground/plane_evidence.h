@@ -96,6 +96,7 @@ struct PlaneEvidence {
   return out;
 }
 
+// place_m: in w. sigma_m: of each component.
 [[nodiscard]] inline PlaneDatum known_point(std::string name, const PlaneSight& sight,
                                             const Vector3<double>& place_m,
                                             const Vector3<double>& sigma_m) {
@@ -116,6 +117,7 @@ struct PlaneEvidence {
   return out;
 }
 
+// heading_rad: of the sight, clockwise from Y of w.
 [[nodiscard]] inline PlaneDatum known_bearing(std::string name, const PlaneSight& sight,
                                               double heading_rad, double sigma_rad) {
   PlaneDatum out = on_horizon(std::move(name), sight);

@@ -22,16 +22,17 @@ struct PlaneFitOptions {
   double most_heading_sigma = 0.2;  // rad
   double most_height_share = 0.2;   // sigma of the height over the height
 
+  // False if a limit is not above 0. *error then says so in one line; error must not be null.
   [[nodiscard]] bool validate(const char** error) const;
 };
 
 enum class PlaneFitStatus {
   kOk,
-  kBadInput,       // such as a sigma not > 0, or a direction not of unit length
+  kBadInput,       // such as a sigma not > 0, a direction not of unit length, or bad options
   kNoScale,        // nothing gives a length
   kUndetermined,   // see message
   kCameraOnPlane,  // the plane goes through the camera
-  kAmbiguous,      // another plane fits equally well
+  kAmbiguous,      // another plane fits about as well
   kMisfit,         // a datum is grossly wrong: see worst
   kNoSolution      // no plane on which all data are defined
 };

@@ -2,7 +2,8 @@
 // One datum's residual (m or rad, as the datum) and its derivatives by the plane and every error.
 //   height, place    p minus the datum
 //   heading          heading minus the datum, wrapped
-//   level, vertical  up minus the datum, in its tangent basis
+//   level            up minus the datum, in its tangent basis
+//   vertical         up or down, whichever is nearer, minus the sight, in its tangent basis
 //   horizon          the direction's elevation
 //   point, bearing   direction minus the sight, in its tangent basis
 //   length           distance of the two places minus the datum

@@ -41,7 +41,8 @@ using PlaneUnknowns = Eigen::Matrix<double, kPlaneParameterCount, Eigen::Dynamic
                                     kPlaneParameterCount, kPlaneParameterCount>;
 [[nodiscard]] PlaneUnknowns plane_unknowns(PlaneFrame frame, const WorldPlane& plane);
 
-// The plane in the camera's frame, if w is the camera's; otherwise unchanged.
+// The plane in the frame that `frame` names: with p_x and p_y of 0 if the origin is below the
+// camera, and heading 0 if the base defines it.
 [[nodiscard]] WorldPlane in_frame(PlaneFrame frame, const WorldPlane& plane);
 
 struct PlaneSolution {
@@ -54,7 +55,8 @@ struct PlaneSolution {
   int steps = 0;
 };
 
-// False: a datum is not defined at the start, or there was no convergence.
+// False: the start's camera is not above the plane, a datum is not defined at the start, or there
+// was no convergence.
 [[nodiscard]] bool solve_plane(const PlaneProblem& problem, const WorldPlane& start,
                                PlaneSolution* out);
 

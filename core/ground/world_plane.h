@@ -48,7 +48,7 @@ struct WorldPlane {
 [[nodiscard]] double heading(const WorldPlane& plane);
 inline constexpr double kLeastForward = 1e-3;  // sine of the angle between forward and the vertical
 
-// d heading / d xi.
+// d heading / d xi; 0 if the heading is undefined.
 [[nodiscard]] Vector3<double> heading_jacobian(const WorldPlane& plane);
 
 // Attitude of the base, as of an aircraft, rad: pitch > 0 lifts the base's forward direction, roll
@@ -69,6 +69,8 @@ struct BaseAttitude {
 struct PlaneLimits {
   double most_sigma_share = 0.2;  // largest sigma of a place over its distance from the camera
 
+  // False unless the share is above 0 and below 1. *error then says so in one line; error must not
+  // be null.
   [[nodiscard]] bool validate(const char** error) const;
 };
 
@@ -80,7 +82,7 @@ struct PlanePoint {
 };
 
 // X: m, in w. J_X_d: by any change of d_b, also of its length. J_X_plane: by (xi, p). The Jacobians
-// may be null.
+// may be null. Here kTooFar is given only if numbers overflow.
 [[nodiscard]] PlaneStatus plane_point(const WorldPlane& plane, const Vector3<double>& d_b,
                                       Vector2<double>* X, Matrix<double, 2, 3>* J_X_d = nullptr,
                                       Matrix<double, 2, kPlaneParameterCount>* J_X_plane = nullptr);
@@ -91,7 +93,8 @@ struct PlanePoint {
                                       const Matrix2<double>& cov_d, const PlaneLimits& limits,
                                       PlanePoint* out);
 
-// P_w: m, any point other than the optical centre, also off the plane. d_b: unit length.
+// P_w: m, any point, also off the plane. d_b: unit length. kNoDirection: P_w is the optical centre.
+// kNotFinite: it is not finite.
 [[nodiscard]] PlaneStatus direction_of(
     const WorldPlane& plane, const Vector3<double>& P_w, Vector3<double>* d_b,
     Matrix3<double>* J_d_P = nullptr, Matrix<double, 3, kPlaneParameterCount>* J_d_plane = nullptr);

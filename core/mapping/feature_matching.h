@@ -41,9 +41,10 @@ using NearFeatures = std::array<NearFeature, kNearFeatures>;
 [[nodiscard]] std::vector<NearFeatures> nearest_features(const std::vector<Descriptor>& queries,
                                                          const std::vector<Descriptor>& indexed);
 
-// The ratio test. near: by query. is_same(a, b): whether two indexed features show the same thing;
-// if so, the second nearest is not a rival. An empty function: no two do. Returns matches in
-// increasing order of query, each indexed feature at most once.
+// The ratio test. near: by query; one with fewer than two near features has no match. ratio: as
+// MatchOptions::ratio. is_same(a, b): whether two indexed features show the same thing; if so, the
+// second nearest is not a rival. An empty function: no two do. Returns matches in increasing order
+// of query, each indexed feature at most once.
 [[nodiscard]] std::vector<FeatureMatch> believed_matches(
     const std::vector<NearFeatures>& near, double ratio,
     const std::function<bool(int, int)>& is_same = {});
@@ -63,7 +64,8 @@ class FeatureIndex {
   [[nodiscard]] std::vector<FeatureMatch> match(const std::vector<Descriptor>& queries,
                                                 const MatchOptions& options = {}) const;
 
-  // As nearest_features(), except for neighbours that the trees miss.
+  // As nearest_features(), except for neighbours that the trees miss. An index of fewer than two
+  // descriptors finds nothing. checks: as MatchOptions::checks.
   [[nodiscard]] std::vector<NearFeatures> nearest(const std::vector<Descriptor>& queries,
                                                   int checks) const;
 

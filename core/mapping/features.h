@@ -39,10 +39,12 @@ struct FeatureOptions {
   int max_features = 1000;  // 1 or more
   int cells = 8;            // along a side; each cell of the image gets the same share of features
   double contrast_threshold = 0.02;  // SIFT's; OpenCV's default is 0.04
-  // Least distance of two features. SIFT gives some blobs two orientations; one is kept.
+  // px of the searched image; of two features of about one size that are nearer, the stronger is
+  // kept. SIFT gives some blobs two orientations.
   double least_distance_px = 1.5;
   // 1, 2 or 4: the searched image has this factor fewer pixels along a side. Faster, without the
-  // smallest features. Places and scales are those of the whole image.
+  // smallest features. No side is shrunk below kLeastImage_px. Places and scales are those of the
+  // whole image.
   int shrink = 1;
 };
 
@@ -55,8 +57,8 @@ class FeatureDetector {
   FeatureDetector(const FeatureDetector&) = delete;
   FeatureDetector& operator=(const FeatureDetector&) = delete;
 
-  // 8-bit luma, row v at luma + v * stride. Empty if there are no features, or a side is shorter
-  // than kLeastImage_px.
+  // 8-bit luma, row v at luma + v * stride. Empty if there are no features or no image (null), or a
+  // side is shorter than kLeastImage_px.
   [[nodiscard]] FeatureSet find(const std::uint8_t* luma, int width, int height,
                                 std::ptrdiff_t stride) const;
 

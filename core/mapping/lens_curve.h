@@ -102,8 +102,8 @@ class LensCurve : public CubicSpline<kLensQuantityCount, LensCurve> {
     return camera(s, value(basis_at(s)), eps, hold_);
   }
 
-  // The camera with this focal length, when the zoom reading is not known: eps is 0 within the
-  // curve's range. J_camera_log: d camera / d log f.
+  // The camera with this focal length, if the zoom reading is not known: eps is 0. log_f: f in px.
+  // J_camera_log: d camera / d log f.
   [[nodiscard]] Camera<double> camera_of(double log_f,
                                          CameraColumn<double>* J_camera_log = nullptr) const {
     // Fixed-point iteration; converges as delta changes slowly.

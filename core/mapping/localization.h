@@ -20,7 +20,7 @@ namespace alidade {
 
 enum class LocalizationStatus {
   kOk,
-  kNotInMap,
+  kNotInMap,        // no pose that can be trusted
   kAmbiguous,       // two places fit
   kNoUsablePicture  // fewer than least_features
 };
@@ -55,7 +55,8 @@ struct LocalizationOptions {
   double least_size = 0.5;
 };
 
-// Prior knowledge of the picture.
+// Prior knowledge of the picture. Orientation and focal length together make a hint; a focal length
+// alone still is a prior of the pose.
 struct LocalizationHint {
   std::optional<Matrix3<double>> R_base_from_camera;
   double R_sigma = 0;  // rad

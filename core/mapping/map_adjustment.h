@@ -66,10 +66,10 @@ struct MapOptions {
 
 enum class MapStatus {
   kOk,
-  kBadInput,       // indices or numbers out of range; no picture
+  kBadInput,       // indices, numbers or options out of range; no picture or no landmark
   kNotConnected,   // see groups
-  kNotDetermined,  // singular
-  kNotConverged,
+  kNotDetermined,  // singular, or the solver has no usable solution
+  kNotConverged,   // within max_steps
 };
 
 [[nodiscard]] const char* to_string(MapStatus status);

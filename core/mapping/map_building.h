@@ -58,14 +58,16 @@ struct MapBuildOptions {
   int least_group = 3;
   bool largest_part = false;  // the largest part is used even then
 
+  // False if a value is invalid. *error, if not null, then says which in one line.
   [[nodiscard]] bool validate(const char** error = nullptr) const;
 };
 
 enum class MapBuildStatus {
   kOk,
-  kBadInput,       // options, or too few pictures
-  kNoTexture,      // fewer than two pictures with enough features
-  kNoFocalLength,  // only some pictures have log_f; or none has it and no focal length fits
+  kBadInput,   // options that validate() refuses, or fewer than two pictures
+  kNoTexture,  // fewer than two pictures with enough features
+  // Only some pictures have log_f; none has it and no focal length fits; or one is off the lens.
+  kNoFocalLength,
   kNotConnected,   // see MapBuild::groups
   kNotDetermined,  // the adjustment found no minimum
 };
@@ -75,14 +77,14 @@ enum class MapBuildStatus {
 // Pictures are indices in the order of add().
 struct MapBuild {
   MapBuildStatus status = MapBuildStatus::kBadInput;
-  SceneMap map;                          // with kOk
-  std::vector<int> of_keyframe;          // picture of each keyframe; with kOk
-  std::vector<int> without_texture;      // pictures that were left out
-  std::vector<int> not_connected;        // likewise
-  std::vector<std::vector<int>> groups;  // with kNotConnected: of pictures, the largest first
-  MapStatus adjustment = MapStatus::kOk;
-  int compared = 0;  // pairs of pictures
-  int linked = 0;    // pairs that a rotation and a change of f explain
+  SceneMap map;                           // with kOk
+  std::vector<int> of_keyframe;           // picture of each keyframe; with kOk
+  std::vector<int> without_texture;       // pictures that were left out
+  std::vector<int> not_connected;         // likewise
+  std::vector<std::vector<int>> groups;   // with kNotConnected: of pictures, the largest first
+  MapStatus adjustment = MapStatus::kOk;  // of the adjustment that failed
+  int compared = 0;                       // pairs of pictures
+  int linked = 0;                         // pairs that a rotation and a change of f explain
   int tracks = 0;
   int observations = 0;    // used by the map
   double residual_px = 0;  // rms of an observation's error

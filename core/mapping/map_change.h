@@ -21,8 +21,8 @@ struct MapChange {
   }
 };
 
-// False, with the map unchanged: the change does not fit the map or holds something invalid; error
-// says what. One pass over the map.
+// False, with the map unchanged: the change does not fit the map or holds something invalid; *error
+// (not null) says what in one line. One pass over the map.
 [[nodiscard]] bool apply(const MapChange& change, SceneMap* map, std::string* error);
 
 }  // namespace alidade

@@ -1,9 +1,10 @@
 #pragma once
 // make_scene_map(): turns an adjustment into a scene map: keyframes, and landmarks with
 // covariances. A landmark is a track with two or more observations that the adjustment kept, or a
-// feature that only one picture has seen. A landmark's own covariance comes from its observations,
-// in tangent_basis(d_b). Its common covariance comes from pose and f of the keyframe in which its
-// direction is known best. Base frame, rad and px. Batch work: allocates.
+// single feature that is in no track, or that the adjustment left out of its track. A landmark's
+// own covariance comes from its observations, in tangent_basis(d_b). Its common covariance comes
+// from pose and f of the keyframe in which its direction is known best. Base frame, rad and px.
+// Batch work: allocates.
 
 #include <optional>
 #include <vector>
@@ -26,7 +27,7 @@ struct MapMaterial {
   std::vector<const LinkedPicture*> pictures;
 };
 
-// Norm of each observation's residual, px; empty if the observation was left out.
+// Norm of each observation's residual, px; empty if the observation was left out or has no pixel.
 [[nodiscard]] std::vector<std::optional<double>> errors_px(const MapEvidence& evidence,
                                                            const MapAdjustment& found);
 

@@ -13,7 +13,7 @@ struct PictureMotion {
   double line_delay = 0;                                       // s/row, any sign
   double reference_row = 0;                                    // px
 
-  // s, from the reference row's.
+  // s; exposure of row v after that of the reference row.
   [[nodiscard]] double time_of_row(double v) const { return (v - reference_row) * line_delay; }
 };
 

@@ -74,8 +74,8 @@ struct PoseOptions {
 
 enum class PoseStatus {
   kOk,
-  kTooFewMatches,  // fewer than least_inliers
-  kNoPose,         // no pair of matches gives a pose with least_inliers
+  kTooFewMatches,  // fewer than least_inliers have usable numbers
+  kNoPose,         // no pose has least_inliers
   kByChance,       // chance makes as many matches agree, see most_chance_log10
   kOneSpot,        // the inliers lie in one spot
   kCollinear,      // the inliers lie nearly on one line

@@ -25,8 +25,8 @@ class PlaceNoise {
   // px; of each coordinate of a feature of this size (sigma of the blob, px).
   [[nodiscard]] double sigma_px(double scale_px) const { return sigma_[bin(scale_px)]; }
 
-  // scale_and_error: size of the feature and norm of the error, px. A bin with fewer than 100 is
-  // not sharper than the bin below it.
+  // scale_and_error: size of the feature and norm of the error, px. A bin with fewer than 100
+  // errors learns nothing, but is taken to be no sharper than the bin below it.
   void learn(const std::vector<std::pair<double, double>>& scale_and_error) {
     constexpr std::size_t kFewest = 100;
     const double median_of_norm = std::sqrt(2 * std::log(2.0));

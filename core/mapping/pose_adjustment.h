@@ -34,7 +34,8 @@ struct PoseFit {
 [[nodiscard]] bool moves_too_far(const PoseKnowledge& knowledge, const PoseState& state);
 
 // Levenberg-Marquardt with Huber's loss; its sigmas are those of the matches times `noise`.
-// inliers: indices of matches, here and below. False: a step is not finite or runs away.
+// inliers: indices of matches, here and below. False: a step is not finite or runs away. True also
+// if max_steps do not lead to the minimum.
 [[nodiscard]] bool adjust_pose(const std::vector<PoseMatch>& matches,
                                const std::vector<int>& inliers, const PoseKnowledge& knowledge,
                                double noise, int max_steps, PoseState* state);

@@ -47,9 +47,11 @@ struct SceneSighting {
 struct LandmarkLife {
   double born_utc_s = 0;
   double last_seen_utc_s = 0;
-  std::uint32_t looked_for = 0;  // views in which it should have been found
-  std::uint32_t matched = 0;     // views in which it was found
-  std::uint32_t missed = 0;      // consecutive views without it, up to the latest; 0: found there
+  // Views in which it should have been found, and of these the ones in which it was. Both are
+  // halved at 200, so that old views fade.
+  std::uint32_t looked_for = 0;
+  std::uint32_t matched = 0;
+  std::uint32_t missed = 0;  // consecutive views without it, up to the latest; 0: found there
 };
 
 struct SceneLandmark {

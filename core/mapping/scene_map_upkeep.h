@@ -55,11 +55,12 @@ struct SceneMapUpkeepOptions {
   double border_px = 12;
 
   [[nodiscard]] double sigma_of(double scale_px) const;  // px, of a feature
+  // False if a value is invalid. *error, if not null, then says which in one line.
   [[nodiscard]] bool validate(const char** error = nullptr) const;
 };
 
 struct UpkeepMatch {
-  int feature = 0;
+  int feature = 0;            // index into UpkeepView::features
   std::int64_t landmark = 0;  // id
 };
 
@@ -77,9 +78,9 @@ struct UpkeepView {
 };
 
 struct UpkeepCounts {
-  int expected = 0;  // landmarks that should be found in this picture
-  int updated = 0;   // matched landmarks that were moved
-  int beyond_gate = 0;
+  int expected = 0;     // landmarks that should be found in this picture
+  int updated = 0;      // matched landmarks that were moved
+  int beyond_gate = 0;  // matched landmarks that were not moved: too far off, or not seen there
   int born = 0;
   int died = 0;
   int not_close = 0;        // not born only because of the proximity check

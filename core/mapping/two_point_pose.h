@@ -13,8 +13,8 @@ struct TwoPointPose {
   double log_f = 0;
 };
 
-// Exact for exact matches. Empty: directions or pixels coincide, directions are more than 2.5 rad
-// apart, or f is out of its range.
+// Exact for exact matches. Empty: directions coincide or are more than 2.5 rad apart, pixels are
+// within 2 px, a pixel has no direction, or f is out of its range or not found.
 [[nodiscard]] std::optional<TwoPointPose> two_point_pose(const PoseMatch& a, const PoseMatch& b,
                                                          const PoseKnowledge& knowledge);
 

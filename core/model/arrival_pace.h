@@ -4,7 +4,7 @@
 // After a stall (a relay, a network or a process that stood still) items wait and then come faster
 // than they were sent: receive - sender falls until the last waiting item has come. During the fall
 // nobody knows where it will end, so an item's age is unknown. A stream that is late by a constant
-// cannot be told from a network with the same delay.
+// cannot be distinguished from a network with that delay.
 // Fixed memory, trivially copyable, no allocation, no exceptions; one thread. All times are
 // seconds.
 
@@ -34,8 +34,8 @@ class ArrivalPace {
     greatest_s_ = -std::numeric_limits<double>::infinity();
   }
 
-  // Values must be finite. An overtaken item is ignored. An item far back is of another clock and
-  // restarts the judgement.
+  // Values must be finite. An item whose stamp is not later than the last one's is ignored. If it
+  // is earlier by kOvertaken_s or more, it is of another clock: the judgement begins anew with it.
   void add(double receive_s, double sender_s) {
     if (size_ > 0 && !(sender_s > item(size_ - 1).sender_s)) {
       if (sender_s > item(size_ - 1).sender_s - kOvertaken_s) return;
@@ -84,7 +84,7 @@ class ArrivalPace {
     return greatest_s_ > least_s + longer_s;
   }
 
-  // The latest items, oldest first; s.
+  // The latest items, 128 at most, oldest first; s.
   [[nodiscard]] std::size_t size() const { return size_; }
   [[nodiscard]] double receive_s(std::size_t i) const { return item(i).receive_s; }
   [[nodiscard]] double sender_s(std::size_t i) const { return item(i).sender_s; }

@@ -2,7 +2,7 @@
 // One calibration of a camera at one zoom: the parameters of the model and their covariance.
 // Parameter numbers the parameters. This is the order of rows and columns of every covariance and
 // parameter Jacobian in Alidade. An axis has two parameters: its change (rad) in its own
-// tangent_basis (direction.h). SI units; see the members. Plain values; no allocation.
+// tangent_basis (direction.h). Units: px, rad, s; see the members. Plain values; no allocation.
 
 #include <algorithm>
 #include <cmath>

@@ -37,31 +37,35 @@ class ClockFilter {
     return accept(receive_time_s, static_cast<double>(sequence), sequence_rate_prior(options_));
   }
 
-  // Host time of any sender time (s) or count, by the present line, and its standard deviation (s).
-  // 0 before the first item.
+  // Host time (s) of any sender time (s) or count, by the present line. 0 while there is no line:
+  // before the first item, and from restart() until the next one.
   double to_host(double sender) const {
     return started_ ? anchor_receive_ + line().value_at(sender - anchor_sender_) : 0.0;
   }
+  // s; standard deviation of to_host(). expected_jitter_s while there is no line.
   double sigma(double sender) const {
     if (!started_) return options_.expected_jitter_s;
     const double x = sender - anchor_sender_;
     return is_one_sided() ? sigma_at(one_sided_, x) : sigma_at(symmetric_, x);
   }
 
-  // skew: host seconds per sender second, minus 1. period_s: period of a counted stream.
+  // Slope of the line. skew: host seconds per sender second, minus 1. period_s: host seconds per
+  // count of a counted stream.
   double skew() const { return line().slope - 1; }
   double period_s() const { return line().slope; }
 
-  // Sum of the minimum delay's steps since the start: the present minimum minus the first one.
+  // s; sum of the minimum delay's steps since the line began: the present minimum minus the first.
+  // kSymmetric: this and the next two are 0.
   double delay_shift_s() const { return is_one_sided() ? one_sided_.shift_s() : 0.0; }
-  // Receive time of the first item after the last step that was flagged by delay_stepped.
+  // Receive time from which items have the minimum delay of the last step that delay_stepped
+  // flagged. A restart does not reset it.
   double delay_shift_since_s() const { return is_one_sided() ? one_sided_.shift_since_s() : 0.0; }
-  // Standard deviation of delay_shift_s(). Every sigma contains it.
+  // s; standard deviation of delay_shift_s(). Every sigma contains it.
   double delay_shift_sigma_s() const {
     return is_one_sided() ? std::sqrt(one_sided_.shift_variance()) : 0.0;
   }
 
-  // Mean delay above the minimum (one-sided), or sigma of the noise (symmetric).
+  // s; mean delay above the minimum (one-sided), or sigma of the noise (symmetric).
   double jitter_s() const { return is_one_sided() ? one_sided_.jitter_s() : symmetric_.jitter_s(); }
 
   // For a reconnection that the caller knows of: the next item starts a new line.
@@ -94,7 +98,8 @@ class ClockFilter {
   //               row starts a new line (restarted).
   //   step of the minimum delay, one-sided only
   //               See one_sided_clock.h. Flagged once; the line does not step.
-  // Lost items are gaps in sender. Repeated and reordered items are answered but teach nothing.
+  // Lost items are gaps in sender. Repeated and reordered items are answered, but do not move the
+  // line; of kOneSided they count for jitter and steps.
   ClockEstimate accept(double receive, double sender, const ClockRatePrior& prior) {
     return is_one_sided() ? accept(&one_sided_, receive, sender, prior)
                           : accept(&symmetric_, receive, sender, prior);
@@ -168,8 +173,9 @@ class ClockFilter {
     return {receive, x, receive - anchor_receive_, sigma_at(clock, x), x > last_x_};
   }
 
-  // Sender backwards by restart_gap_s, receive time before the line by restart_gap_s, or after it
-  // by ten times that. Both limits at the line are at least 6 and 60 sigma.
+  // True if the sender goes back by more than restart_gap_s, if the receive time is before the line
+  // by more than restart_gap_s or after it by more than ten times that (but at least 6 and 60
+  // sigma), or if sender or receive time is kMaxSpan_s from the line's first item.
   template <class Clock>
   bool is_wild(const Clock& clock, const internal::ClockItem& item) const {
     if (!(std::abs(item.x) < kMaxSpan_s && std::abs(item.y) < kMaxSpan_s)) {

@@ -169,7 +169,7 @@ class ClockSmoother {
     anchor_receive_ = y_[from];
     LineEstimate line;
     if (!(one_sided() ? fit_one_sided(a, b, &line) : fit_symmetric(a, b, &line))) {
-      return;  // only rejected items
+      return;  // no usable item
     }
     const double span = y_[b - 1] - y_[a];
     const double wander = options_.skew_wander * options_.skew_wander * span * span * span /

@@ -16,7 +16,7 @@ struct ClockFilterOptions {
   ClockJitter jitter = ClockJitter::kOneSided;
   double window_s = 60;               // host time that the line of kOneSided remembers
   double nominal_period_s = 0;        // of a sequence; 0: unknown, estimated
-  double nominal_period_sigma_s = 0;  // 0: max_skew * nominal_period_s
+  double nominal_period_sigma_s = 0;  // prior: +-4 of these; 0: +-max_skew * nominal_period_s
   double max_skew = 200e-6;           // |rate - 1| of a sender clock
   double skew_wander = 1.5e-7;        // 1/sqrt(s): random walk of the skew
   double expected_jitter_s = 5e-3;    // first guess, soon outweighed by the data
@@ -58,6 +58,7 @@ inline ClockRatePrior sender_rate_prior(const ClockFilterOptions& options) {
   return {1.0, options.max_skew};
 }
 
+// Without a nominal period: 0 to kLongestPeriod_s.
 inline ClockRatePrior sequence_rate_prior(const ClockFilterOptions& options) {
   constexpr double kLongestPeriod_s = 10;
   const double period = options.nominal_period_s;
@@ -70,7 +71,7 @@ inline ClockRatePrior sequence_rate_prior(const ClockFilterOptions& options) {
 
 enum class ClockState {
   kWarmingUp,  // usable; the line may still move by more than min_delay_step_s
-  kLocked      // settle_s of data seen, and sigma_s below min_delay_step_s
+  kLocked      // since settle_s of data gave sigma_s below min_delay_step_s; until a restart
 };
 
 struct ClockEstimate {
@@ -78,7 +79,7 @@ struct ClockEstimate {
   double sigma_s = 0;  // one standard deviation of time_s
   ClockState state = ClockState::kWarmingUp;
   bool rejected = false;       // stamps unusable: time_s is from the receive time or last item
-  bool restarted = false;      // this item is the first after a restart
+  bool restarted = false;      // this item is the first of a new line after a restart
   bool delay_stepped = false;  // this item proves a step of the minimum delay; not followed
 };
 

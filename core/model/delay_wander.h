@@ -22,8 +22,8 @@ class DelayWander {
   // those.
   static constexpr double kPart_s = 0.25;
   static constexpr double kLongPart_s = 1;
-  static constexpr double kWander_s = 1e-3;
-  static constexpr double kMemory_s = 20;
+  static constexpr double kWander_s = 1e-3;  // smaller distances do not count
+  static constexpr double kMemory_s = 20;    // time constant
 
   // For a new line. The present uncertainty stays and fades.
   void restart() { windows_ = {{{kPart_s, {}, {}}, {kLongPart_s, {}, {}}}}; }
@@ -43,7 +43,8 @@ class DelayWander {
     share_ += (off - share_) * std::min(since_s, kPart_s) / kMemory_s;
   }
 
-  // True if the stream was off the line by kWander_s for more than kShare of the last kMemory_s.
+  // True if the stream was off the line by more than kWander_s for more than the share kShare of
+  // the time, as averaged exponentially with kMemory_s.
   [[nodiscard]] bool wanders() const { return share_ > kShare; }
   // s; how far an item may be off the line, as of the last item. While the stream wanders, the
   // value fades with the time constant kMemory_s.

@@ -58,7 +58,8 @@ inline double periods_skipped(const std::array<double, kItemsAhead>& late, std::
 }  // namespace internal
 
 // receive_time_s and sequence: n values; receive times in order of arrival. period_s: > 0. The
-// first count is 0. False if period_s is not positive, or a number is not finite.
+// first count is 0. False if period_s is not positive, if a number is not finite, or if more than
+// kMostSkipped counts lie between two items; `sequence` is then not to be used.
 [[nodiscard]] inline bool infer_sequence(const double* receive_time_s, std::size_t n,
                                          double period_s, std::int64_t* sequence) {
   constexpr double kTracking = 1.0 / 16;

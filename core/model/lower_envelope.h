@@ -43,8 +43,8 @@ class LowerEnvelope {
 
   void lock() { locked_ = true; }
 
-  // Until release(), items at host time y or later do not count. Ignored if too few items lie
-  // before y.
+  // Until release(), slots at host time y or later do not count. Ignored if fewer than kLeastHeld
+  // slots lie before y, unless slots are held already.
   void hold(double y) {
     if (held_from_ < kNever || (slots_ >= kLeastHeld && y_[kLeastHeld - 1] < y)) {
       held_from_ = y;

@@ -31,7 +31,8 @@ struct LineEstimate {
   }
 };
 
-// Writes the indices of the lower convex hull's vertices, left to right. Returns their number.
+// Writes the indices of the lower convex hull's vertices, left to right. Returns their number. x:
+// strictly increasing. n: at most 65536. hull: room for n indices.
 inline std::size_t lower_hull(const double* x, const double* y, std::size_t n,
                               std::uint16_t* hull) {
   std::size_t size = 0;
@@ -151,8 +152,8 @@ inline LineEstimate fit_lower_line(const double* x, const double* y, std::size_t
 
 // Scale of the delays, from their residuals above the lowest point along a fitted line. Uses a low
 // quantile, rank n / 8 but at least min(n / 2, 8): the density next to the minimum counts, heavy
-// tails do not. least: the result is at least this, > 0. guess: of the scale; it weighs as much as
-// two points. residual: room for n values.
+// tails do not. least: > 0; lower limit of what the points show. guess: > 0; of the scale. It
+// weighs as much as two points, and is the result if n < 2. residual: room for n values.
 inline double delay_scale(const double* x, const double* y, std::size_t n, const LineEstimate& line,
                           double least, double guess, double* residual) {
   constexpr double kGuessWeight = 2;

@@ -20,7 +20,7 @@
 namespace alidade::internal {
 
 struct DelayStep {
-  double since_s = 0;  // receive time of the first item with the new minimum
+  double since_s = 0;  // receive time; items from here on are known to have the new minimum
   double step_s = 0;   // new minimum delay minus the old one
   double sigma_s = 0;  // of step_s
 };
@@ -51,7 +51,7 @@ class MinimumDelayStep {
   }
 
   void add_late(double receive_s, double residual_s) { late_.add(receive_s, residual_s, false); }
-  // The same item, after add_late(). mean_s: usual mean delay above the line.
+  // The same item, after add_late(). mean_s: usual mean delay above the line, s.
   void suspect(double receive_s, double residual_s, double mean_s) {
     stretch_.add(receive_s, residual_s, std::max(mean_s, resolution_s_));
   }
@@ -106,7 +106,6 @@ class MinimumDelayStep {
     double since = 0;   // of the older half's first item
     double middle = 0;  // of the younger half's first item
     double older = 0;   // minimum residual
-    double younger = 0;
     // Of the younger half:
     double items = 0;
     double early = 0;
@@ -117,16 +116,13 @@ class MinimumDelayStep {
       if (!active) {
         active = true;
         first = since = middle = receive;
-        older = younger = residual;
+        older = residual;
       }
-      younger = std::min(younger, residual);
-      std::size_t place = held();
-      if (place < kLowest || residual < lowest[kLowest - 1]) {
-        place = std::min(place, kLowest - 1);
-        for (; place > 0 && lowest[place - 1] > residual; --place) {
-          lowest[place] = lowest[place - 1];
-        }
-        lowest[place] = residual;
+      const std::size_t n = held();
+      if (n < kLowest || residual < lowest[n - 1]) {
+        const auto last = lowest.begin() + std::min(n, kLowest - 1);
+        *last = residual;
+        std::rotate(std::upper_bound(lowest.begin(), last, residual), last, last + 1);
       }
       items += 1;
       early += is_early ? 1 : 0;
@@ -134,16 +130,19 @@ class MinimumDelayStep {
     }
     void begin_half(double receive) {
       since = middle;
-      older = younger;
+      older = younger();
       middle = receive;
-      younger = std::numeric_limits<double>::infinity();
       items = early = sum = 0;
+    }
+    // Its minimum residual.
+    [[nodiscard]] double younger() const {
+      return items > 0 ? lowest[0] : std::numeric_limits<double>::infinity();
     }
     [[nodiscard]] std::size_t held() const {
       return items < static_cast<double>(kLowest) ? static_cast<std::size_t>(items) : kLowest;
     }
     // Standard deviation of a half's minimum residual if its delays are exponential.
-    [[nodiscard]] double spread() const { return (sum / items - younger) / items; }
+    [[nodiscard]] double spread() const { return (sum / items - younger()) / items; }
     // The same whatever the delays are, such as a relay's, few of which are short: the mean spacing
     // of the lowest residuals. Strays among them make it large.
     [[nodiscard]] double spacing() const {
@@ -161,9 +160,9 @@ class MinimumDelayStep {
       return std::nullopt;
     }
     const double spread = std::max({run->spread(), falls ? 0 : run->spacing(), resolution_s_});
-    const double step = std::min(run->older, run->younger);
+    const double step = std::min(run->older, run->younger());
     if (run->middle == run->since || run->items < kLeastItems ||
-        std::abs(run->older - run->younger) > kSameMinimum * spread + drift ||
+        std::abs(run->older - run->younger()) > kSameMinimum * spread + drift ||
         (!falls && step < kSameMinimum * spread)) {
       run->begin_half(receive);
       return std::nullopt;

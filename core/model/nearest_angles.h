@@ -1,8 +1,9 @@
 #pragma once
 // True pan and tilt angles at which a mount comes nearest to an orientation R: least squares of xi
-// in R = R_base_from_camera(angle) Exp(xi), by Gauss-Newton from the angles for nominal axes. A
-// mount has no roll, so a difference `off` remains. If the camera looks along the pan axis, the
-// angles are not unique. No allocation, no state.
+// in R = R_base_from_camera(angle) Exp(xi), by Gauss-Newton from the angles that the optical axis
+// gives for nominal axes. A mount has no roll, so a difference `off` remains. If the camera looks
+// along the pan axis, the pan of the start is arbitrary, and R's roll determines pan. The axes must
+// not be parallel. No allocation, no state.
 
 #include <algorithm>
 #include <cmath>

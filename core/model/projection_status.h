@@ -8,7 +8,7 @@ enum class ProjectionStatus {
   kOk,
   kBehindCamera,           // the direction has no positive component along the optical axis
   kBeyondDistortionLimit,  // radial_distortion < 0, beyond the radius where the model turns back
-  kNoRow,                  // rolling shutter: no unique row; the motion overtakes the read-out
+  kNoRow,                  // rolling shutter: no unique row, as the motion overtakes the read-out
   kNotFinite               // an argument is not finite, or the result is too large to represent
 };
 

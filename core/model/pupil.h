@@ -23,19 +23,19 @@ struct Pupil {
   Vector3<double> sigma_m = Vector3<double>::Constant(kUsualPupilSigma_m);  // of each component
 };
 
-// The farthest that a pupil may be from the axes, and the nearest that a scene may be. Beyond these
-// values have another unit.
+// Largest accepted coordinate of a pupil's place, and smallest accepted distance of a scene. Input
+// beyond them is refused where it is read, as it is probably in another unit.
 inline constexpr double kFarthestPupil_m = 1;
 inline constexpr double kNearestScene_m = 1;
 
-// Of what is in view, from where pan and tilt axis meet.
+// Of what is in view, from where pan and tilt axis meet. farthest_m >= nearest_m > 0.
 struct SceneDistance {
   double nearest_m = kNearestScene_m;
   double farthest_m = std::numeric_limits<double>::infinity();
 };
 
-// o / r, o the pupil's place before the axes, r the distance. As log f grows by it, things at this
-// distance look like far things through a lens with a longer focal length.
+// z / r: z the pupil's place in front of the axes (m, Pupil::place_m.z()), r the thing's distance
+// (m). Things at the distance r look like far things through a lens whose log f is larger by this.
 struct Nearness {
   double value = 0;
   double sigma = 0;
@@ -53,8 +53,8 @@ struct Nearness {
   return {mean * o, std::sqrt(of_pupil * (mean * mean + variance) + variance * o * o)};
 }
 
-// Where a thing is truly seen that a calibration of a scene with this nearness (scene_nearness())
-// takes for a far thing in d. Unit vectors, base.
+// A calibration made of a scene with this nearness (scene_nearness()) takes a thing for a far one
+// in d. Returns the direction in which the pupil truly sees it. Unit vectors, base.
 [[nodiscard]] inline Vector3<double> seen_by_pupil(const Matrix3<double>& R_base_from_camera,
                                                    const Vector3<double>& d, double nearness) {
   Vector3<double> d_c = R_base_from_camera.transpose() * d;
@@ -62,9 +62,10 @@ struct Nearness {
   return (R_base_from_camera * d_c).normalized();
 }
 
-// *d: of a thing at distance_m that is seen in d_seen (unit vectors, base). *cov: in
-// tangent_basis(*d), rad^2, what the pupil and the distance leave open; sigma of the distance: m.
-// False where the pupil is as far away as the thing.
+// *d: direction from the axes of a thing at distance_m from them that the pupil sees in d_seen
+// (unit vectors, base). *cov: rad^2, in tangent_basis(*d), from the errors of the pupil's place and
+// of the distance only. False if the pupil is not nearer to the axes than the thing; *d and *cov
+// are then unchanged.
 [[nodiscard]] inline bool direction_from_axes(const Pupil& pupil,
                                               const Matrix3<double>& R_base_from_camera,
                                               const Vector3<double>& d_seen, double distance_m,
@@ -83,8 +84,9 @@ struct Nearness {
   return true;
 }
 
-// m: nearer things have a focal length that differs by more than this share, one standard
-// deviation, from that of far ones. 0: all distances are right.
+// m; nearer things look as through a focal length that differs from that of far things by a share
+// of more than relative_sigma, for a pupil one standard deviation farther off than its place. 0,
+// that is no limit, if relative_sigma is not positive.
 [[nodiscard]] inline double holds_beyond_m(const Pupil& pupil, double relative_sigma) {
   const double forward = std::abs(pupil.place_m.z()) + pupil.sigma_m.z();
   return relative_sigma > 0 ? forward / relative_sigma : 0;

@@ -5,10 +5,11 @@
 //   back-projection, direct:    d_b = R_base_from_camera(angle(v)) unproject(u),  v = u_v
 //   projection, solved for v:   v = project(R_base_from_camera(angle(v))^T d_b)_v
 // v is continuous; the solved row may lie outside the image. It is unique while the slope d
-// project_v / d v is below 1: the direction's image moves down more slowly than the read-out. If
-// the slope reaches 1 between the reference row and the solution, the status is kNoRow. If the
-// camera refuses the direction at the reference row, the status is the camera's.
-// Domain: as camera.h and mechanics.h. Outputs are written with kOk only. No allocation.
+// project_v / d v is below 1: the direction's image moves down more slowly than the read-out. The
+// search begins at the reference row. If the slope reaches 1 at a row that it tries, or if it does
+// not converge, the status is kNoRow. If the camera refuses the direction at a row that it tries,
+// the status is the camera's.
+// Domain: as camera.h and mechanics.h. Outputs are of use with kOk only. No allocation.
 
 #include <Eigen/Core>
 #include <cmath>

@@ -28,7 +28,8 @@ class StampCount {
 
   void restart() { *this = StampCount(); }
 
-  // Values must be finite.
+  // Values must be finite. If the stamp did not grow, or grew by more than kLongestStep_s, all is
+  // forgotten.
   void add(double receive_s, double sender_s) {
     const double step_s = sender_s - last_sender_s_;
     const bool first = !any_;
@@ -61,7 +62,8 @@ class StampCount {
   }
 
   // The stamps' rate minus 1, if they are shown to count. All stamps must be on one grid. The
-  // minima of receive - sender in kFewParts to kParts seconds must never have fallen, and rise
+  // minima of receive - sender in kFewParts to kParts seconds must not fall (beyond kBack_s) and
+  // must rise
   //   by whole steps  to within kOnStep of a step, and by kSteps or more: no backlog grows like
   //                   that;
   //   or in any way   by kApart_s, or by kNearApart_s if no second's rise exceeds kNear.
@@ -77,6 +79,7 @@ class StampCount {
     return -apart_s / span_s;
   }
 
+  // s; the finest step between two stamps. 0: unknown.
   [[nodiscard]] double step_s() const { return step_s_; }
 
  private:

@@ -22,7 +22,8 @@ class StampJumps {
 
   void restart() { *this = StampJumps(); }
 
-  // Values must be finite. behind_backlog: the item before had waited. Overtaken items are ignored.
+  // Values must be finite. behind_backlog: the item before had waited, so this one shows no jump;
+  // nor do the first kFewItems. Overtaken items are ignored.
   // A jump: the stamp's interval differs from the usual interval by more than twice the difference
   // of the arrival's interval, and |jump| exceeds kLeast_s and kGate times the arrivals' mean
   // deviation. A jump fades with kMemory_s: by then the line has taken up a single step, and a

@@ -28,7 +28,8 @@ class StampRate {
 
   void restart() { *this = StampRate(); }
 
-  // Values must be finite. Overtaken items are ignored.
+  // Values must be finite. Repeated and overtaken items are ignored. After kLongestGap_s without an
+  // item, or if a stamp goes back by kOvertaken_s, the judgement begins anew.
   void add(double receive_s, double sender_s) {
     if (items_ > 0 && receive_s - last_receive_s_ > kLongestGap_s) restart();
     if (any_ && !(sender_s > last_sender_s_)) {

@@ -53,13 +53,14 @@ class SteadyZoom {
   [[nodiscard]] bool has_jitter() const { return sigma_ > 0; }
   // True if the last reading revealed the jitter.
   [[nodiscard]] bool found_now() const { return found_now_; }
-  [[nodiscard]] double sigma() const { return sigma_; }  // device units
+  [[nodiscard]] double sigma() const { return sigma_; }  // device units; 0: no jitter known
   // Number of the present rest, counted up at the beginning of each. Empty if the last reading
   // passed unchanged.
   [[nodiscard]] std::optional<std::size_t> rest() const {
     return steadied_ ? std::optional<std::size_t>(rest_) : std::nullopt;
   }
-  // Device units; two steady readings no further apart are the same zoom.
+  // Device units; two steady readings no further apart are the same zoom. 0 as long as no jitter is
+  // known and no tolerance was given.
   [[nodiscard]] double tolerance() const { return given_.value_or(kOneZoom * sigma_); }
 
   // Rounded to the figures that the jitter leaves significant. Needs has_jitter().

@@ -3,7 +3,7 @@
 //   measured = scale true + g(true) + play                              (play: play.h)
 // The curve g of the true angle is Catmull-Rom between uniform knots, linear in the knots' values.
 // At the distance d beyond the edge knot the curve fades: g = g(edge) e, e = exp(-d^2 / (2
-// length^2)), and its variance becomes unseen_sigma^2. Knots that fill a whole turn have no edge.
+// length^2)), and its variance goes over to unseen_sigma^2. Knots of a whole turn have no edge.
 // Angles are rad, any turn; they are wrapped here. The slope of g must stay below the scale, so
 // that the inverse exists: see validate(). Plain values in fixed memory; no allocation.
 
@@ -36,7 +36,7 @@ struct AngleErrorCurve {
   std::array<double, kMaxKnots> values{};  // rad
   std::array<double, kMaxKnots> sigmas{};  // rad, of the values
   double length_rad = 0;                   // correlation length of the values' errors
-  double unseen_sigma_rad = 0;             // of g where there is no knot
+  double unseen_sigma_rad = 0;             // of g far from all knots
 
   // False: nothing is known of an error.
   [[nodiscard]] bool exists() const { return count > 0 || unseen_sigma_rad > 0; }
@@ -227,7 +227,7 @@ struct TelemetryError {
   return angle;
 }
 
-// Both axes.
+// Both axes, without play.
 [[nodiscard]] inline PanTilt<double> true_from_measured(const Mechanics<double>& mechanics,
                                                         const TelemetryError& error,
                                                         const PanTilt<double>& measured) {

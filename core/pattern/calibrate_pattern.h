@@ -20,22 +20,23 @@ namespace alidade {
 enum class PatternStatus {
   kOk,
   kBadInput,         // sizes, indices, times or numbers contradict pattern_data.h
-  kNoPattern,        // no frame shows enough of the pattern
-  kTooFewFrames,     // too few show the pattern, or the video is too short
+  kNoPattern,        // no frame shows the pattern
+  kTooFewFrames,     // too few frames show the pattern, or these show too few points of it
   kNoStart,          // the views do not determine a lens, even roughly
-  kNotConverged,     // no curve explains the detections
+  kNotConverged,     // no poses, or no curve, explain the detections
   kFrameRateTooLow,  // the curve cannot follow the motion
-  kNoLineDelay,      // the image hardly moved during the read-out
-  kNoLens,           // the views are too similar
+  kNoLineDelay,      // the pattern or, during the read-out, the image hardly moved
+  kNoLens,           // a focal length is too uncertain: similar views, or a bent pattern
 };
 
 struct PatternCalibrationOptions {
   LensKnowledge known;
-  double start_line_delay_s = 0;  // start value, any sign
+  double start_line_delay_s = 0;  // s/row; start value, any sign; unless the line delay is fixed
   // Largest standard deviation of line delay * height; beyond it the motion was not enough.
   double largest_readout_sigma_s = 5e-4;
-  // Largest relative standard deviation; beyond it the views were not enough. Errors of simulated
-  // views were up to 1.9 sigmas for sigmas of 0.4 to 0.8 %, and up to 7 for 1 to 2 %.
+  // Largest relative standard deviation of a focal length; beyond it the views were not enough.
+  // Errors of simulated views were up to 1.9 sigmas for sigmas of 0.4 to 0.8 %, and up to 7 for 1
+  // to 2 %.
   double largest_focal_length_sigma = 0.008;
 };
 
@@ -45,7 +46,7 @@ struct PatternCalibration {
   std::vector<std::string> remarks;  // if not refused: one line each, what is worth knowing
 
   LensVector lens = LensVector::Zero();
-  LensMatrix covariance = LensMatrix::Zero();  // in LensParameter's units; 0 where fixed
+  LensMatrix covariance = LensMatrix::Zero();  // in LensParameter's units; 0 for a fixed one
   PoseCurve curve;                      // the camera in the pattern's frame, times as the data's
   double sigma_px = 0;                  // of a detection's coordinate, from the residuals
   double residual_rms_px = 0;           // of a coordinate
@@ -56,6 +57,7 @@ struct PatternCalibration {
   int rounds = 0;                       // of splitting the curve
   std::vector<std::vector<char>> used;  // by frame and observation
 
+  // One standard deviation, in the parameter's unit.
   [[nodiscard]] double sigma(LensParameter parameter) const;
   // Whether the line delay is 0 within three sigmas.
   [[nodiscard]] bool has_global_shutter() const;

@@ -20,8 +20,8 @@ class CharucoGrid {
  public:
   explicit CharucoGrid(const KnownPattern& pattern);
 
-  // image: 8-bit grey. corners: OpenCV's pixels. points: for each corner its index into
-  // KnownPattern::points_m. Both are empty if the board is not found.
+  // image: 8-bit grey. Appends to *corners (OpenCV's pixels) and, for each corner, its index into
+  // KnownPattern::points_m to *points. Appends nothing if the board is not found.
   void find(const cv::Mat& image, std::vector<cv::Point2f>* corners, std::vector<int>* points);
 
   // One line: why no image so far showed this board, and what would help. Empty if an image did.

@@ -30,7 +30,7 @@ class CharucoLayout {
     cv::Matx33d image_from_board;  // OpenCV's pixels
     double square_px;              // smallest side about it
   };
-  // The markers that count in this image (8-bit grey).
+  // The markers that count in this image (8-bit grey). None while is_undecided().
   [[nodiscard]] std::vector<Marker> markers_in(const cv::Mat& image);
 
   // The middle of each marker's square.

@@ -14,13 +14,15 @@
 namespace alidade::internal {
 
 struct CircleCentres {
-  // 0: its area differs from the others', or could not be measured.
+  // By centre. 0: its area differs from the others', or could not be measured. All 1 if radius_m is
+  // 0.
   std::vector<char> is_whole;
-  std::vector<Vector2<double>> beside;  // shift that was taken off, px
-  double radius_m = 0;                  // 0: not measured, the centres are unchanged
+  std::vector<Vector2<double>> beside;  // by centre; shift that was taken off, px
+  double radius_m = 0;                  // of all circles; 0: not measured, nothing was taken off
 };
 
-// centres: OpenCV's pixels, in the order of pattern.points_m().
+// image: 8-bit grey. centres: OpenCV's pixels, one for each of pattern.points_m(), in its order; in
+// to about a pixel, out refined.
 [[nodiscard]] CircleCentres refine_circles(const cv::Mat& image, const KnownPattern& pattern,
                                            std::vector<cv::Point2f>* centres);
 

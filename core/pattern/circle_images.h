@@ -25,7 +25,8 @@ struct CircleImage {
   double area = 0;  // px^2
 };
 
-// map: from a place on the pattern to px. Uses a polygon of the circle's area.
+// map: from a place on the pattern (in the unit of centre and radius) to px. Uses a polygon of the
+// circle's area. Not finite if the map is not.
 template <class Map>
 [[nodiscard]] CircleImage circle_image(const Map& map, const Vector2<double>& centre,
                                        double radius) {

@@ -9,10 +9,10 @@ namespace alidade::internal {
 // Least distance of two corners, px; a large number if there are fewer than two.
 [[nodiscard]] double least_distance(const std::vector<cv::Point2f>& corners);
 
-// Half the side of a window around one corner that holds no other, px.
+// Half the side of a window around one corner that holds no other, px; 2 to 11.
 [[nodiscard]] int corner_window(const std::vector<cv::Point2f>& corners);
 
-// Refines each corner in such a window.
+// Refines each corner in such a window. image: 8-bit grey.
 void refine_corners(const cv::Mat& image, std::vector<cv::Point2f>* corners);
 
 }  // namespace alidade::internal

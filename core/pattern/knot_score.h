@@ -31,7 +31,8 @@ struct KnotScore {
                                     const PatternState& state, const KnotScoreOptions& options);
 
 // sigma of an observation's coordinate, px: what one step of a curve with one knot a frame leaves.
-// It does not depend on motion that the state's own curve does not follow.
+// It does not depend on motion that the state's own curve does not follow. 0 if there are too few
+// observations. frame_interval_s: s, > 0.
 [[nodiscard]] double observation_noise(const PatternData& data, const PatternMask& used,
                                        const PatternState& state, double frame_interval_s);
 

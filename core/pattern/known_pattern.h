@@ -5,7 +5,8 @@
 //   circles:4x11:20mm           asymmetric grid, 11 rows of 4 as OpenCV counts; half their distance
 //   symmetric-circles:7x6:20mm  distance of neighbours
 //   aprilgrid:6x6:30mm:0.3      side of a tag with its black border, gap as a share of the side
-//   charuco:9x6:30mm:22mm       squares, side of a square, side of a marker, perhaps a dictionary
+//   charuco:9x6:30mm:22mm       squares, side of a square, side of a marker; then a dictionary,
+//                               such as :5x5_100, unless it is 4x4_50
 // Details: docs/manual/reference/patterns.md. ChArUco boards need a build with opencv_aruco.
 
 #include <array>
@@ -35,7 +36,7 @@ inline constexpr std::array<MarkerDictionary, 21> kMarkerDictionaries = {
 
 struct KnownPattern {
   PatternKind kind = PatternKind::kChessboard;
-  int columns = 0;
+  int columns = 0;  // as in the name: points in a row, or tags, or a ChArUco board's squares
   int rows = 0;
   double size_m = 0;    // the length that the kind names
   double gap = 0;       // AprilGrid: share of size_m

@@ -19,12 +19,13 @@ namespace alidade {
 struct LensCamera {
   Camera<double> camera;
   double line_delay = 0;  // s/row
-  // Of f, alpha, k and line delay.
+  // Of f (px), alpha, k and line delay (s/row).
   Matrix<double, 4, 4> covariance = Matrix<double, 4, 4>::Zero();
   double misfit_px = 0;  // rms that no rotation and no k absorbs
 };
 
-// width, height: px, of the lens's image. Empty if the lens cannot be inverted over the image.
+// width, height: px, of the lens's image. Empty if the lens cannot be inverted over the image, or
+// if no camera is found for all of it and for each part.
 [[nodiscard]] std::optional<LensCamera> camera_of_lens(const LensVector& lens,
                                                        const LensMatrix& covariance, int width,
                                                        int height);

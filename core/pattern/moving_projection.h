@@ -28,9 +28,10 @@ using ControlPoints = Matrix<double, 6, 4>;
 
 [[nodiscard]] ControlPoints control_points_of(const PoseCurve& curve, int segment);
 
-// row_guess: px, start of the iteration for the row. Uses only the segment's polynomials, even
-// beyond its ends, so that a solver's parameter blocks do not change while it steps. kNoRow: the
-// image moves as fast as the read-out, or no row was found. Outputs are written with kOk only.
+// p: m, pattern frame. row_guess: px, start of the iteration for the row. Uses only the segment's
+// polynomials, even beyond its ends, so that a solver's parameter blocks do not change while it
+// steps. kNoRow: the image moves about as fast as the read-out, or no row was found. *projection is
+// written with kOk only, its Jacobians if with_jacobians.
 [[nodiscard]] ProjectionStatus project_moving(const PoseCurve& curve, int segment,
                                               const ControlPoints& points, const LensVector& lens,
                                               double frame_time_s, const Vector3<double>& p,

@@ -26,7 +26,7 @@ struct PatternAdjustmentOptions {
   // First trust region, in Ceres's units. Small far from the solution, so that no step runs wild.
   // Large near it, where a small one would keep weakly determined parameters from moving.
   double first_radius = 1e4;
-  double relative_decrease = 1e-7;  // of the cost, at which the adjustment ends
+  double relative_decrease = 1e-7;  // of the cost in a step; with less the adjustment ends
 };
 
 // Mean over the whole curve, (m/s^2)^2 and (rad/s^2)^2.
@@ -41,6 +41,7 @@ enum class AdjustmentEnd {
   kFailed,      // no usable solution
 };
 
+// *state: in, the start; out, the solution; after kFailed not to be used.
 [[nodiscard]] AdjustmentEnd adjust_pattern(const PatternData& data, const PatternMask& used,
                                            const LensKnowledge& knowledge,
                                            const PatternAdjustmentOptions& options,

@@ -17,8 +17,8 @@ struct PatternObservation {
 };
 
 struct PatternFrame {
-  double time_s = 0;  // of row 0, on a steady clock; increasing
-  std::vector<PatternObservation> observations;
+  double time_s = 0;                             // of row 0, on a steady clock; increasing
+  std::vector<PatternObservation> observations;  // by increasing point
 };
 
 struct PatternData {

@@ -23,12 +23,13 @@ class PatternDetector {
   PatternDetector(const PatternDetector&) = delete;
   PatternDetector& operator=(const PatternDetector&) = delete;
 
-  // 8-bit luma, row v at luma + v * stride. The observations are ordered by point; empty if the
-  // pattern is not found.
+  // 8-bit luma, row v at luma + v * stride, stride >= width. The observations are ordered by point;
+  // empty if the pattern is not found, or a side is shorter than kLeastImage_px.
   [[nodiscard]] std::vector<PatternObservation> find(const std::uint8_t* luma, int width,
                                                      int height, std::ptrdiff_t stride);
 
-  // One line: what the images so far showed in place of the pattern; empty if nothing is known.
+  // One line: what the images so far showed in place of the pattern; empty if nothing is known, as
+  // always with chessboards and circles.
   [[nodiscard]] std::string doubt() const;
 
  private:

@@ -1,7 +1,7 @@
 #pragma once
 // doubts_of(): what detections show of a video that makes a calibration worse or fail: gaps without
-// the pattern, and a second pattern in view. One line each, for a person. Expects steady times and
-// undone half turns. Pure; allocates.
+// the pattern, and a second pattern in view. One line each, for a person. Expects steady times,
+// observations ordered by point, and half turns undone (follow_half_turns()). Pure; allocates.
 
 #include <string>
 #include <vector>

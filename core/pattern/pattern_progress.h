@@ -28,6 +28,7 @@ struct PatternProgress {
   std::array<double, 9> covered{};
 };
 
+// The default without frames. Observations must be ordered by point.
 [[nodiscard]] PatternProgress progress_of(const PatternData& data);
 
 // How well frames follow the motion: the distance of the points in the middle one of five frames

@@ -17,12 +17,12 @@ struct FramePose {
   Vector3<double> centre = Vector3<double>::Zero();  // of the camera, m, pattern frame
 };
 
-// Focal length and k1, with the optical centre in the image's middle; fixed parameters are at their
-// mean. Empty if the views do not determine the lens.
+// Focal length and k1, with the optical centre in the image's middle and a line delay of 0; fixed
+// parameters are at their mean. Empty if the views do not determine the lens.
 [[nodiscard]] std::optional<LensVector> start_lens(const PatternData& data,
                                                    const LensKnowledge& knowledge);
 
-// Poses of the frames that show enough of the pattern.
+// Poses of the frames that show enough of the pattern (six points), if one is found.
 [[nodiscard]] std::vector<FramePose> start_poses(const PatternData& data, const LensVector& lens);
 
 // Uniform knots about spacing_s apart, from margin_s before the first pose to margin_s after the

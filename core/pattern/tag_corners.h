@@ -27,9 +27,10 @@ using CornerSquares = std::array<bool, 4>;
 // Corners of a tag with this many cells a side: lower left, lower right, upper right, upper left.
 [[nodiscard]] std::vector<cv::Point2f> tag_square(int side);
 
-// corners: OpenCV's pixels, in that order; about a pixel off at first. gap: to the next tag, equal
-// to the side of a square outside; as a share of the tag's side. False if the corners leave the
-// image or it does not show the tag there.
+// image: 8-bit grey, here and below. corners: four, OpenCV's pixels, in that order; about a pixel
+// off at first. gap: to the next tag, equal to the side of a square outside; as a share of the
+// tag's side. False if the corners leave the image or it does not show the tag there; *corners are
+// then not to be used.
 [[nodiscard]] bool refine_tag_corners(const cv::Mat& image, const TagFace& face,
                                       const CornerSquares& squares, double gap,
                                       std::vector<cv::Point2f>* corners);

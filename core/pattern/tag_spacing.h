@@ -22,7 +22,8 @@ class TagSpacing {
   // pattern: the grid as it was named.
   explicit TagSpacing(const KnownPattern& pattern) : pattern_(pattern), gap_(pattern.gap) {}
 
-  // Adds the tags of one image. rough: corners may be half a pixel off.
+  // Adds the tags of one image. rough: corners may be half a pixel off; they count only until there
+  // are enough others.
   void add(const std::vector<NumberedTag>& tags, bool rough);
 
   // Gap between tags, as a share of their side. As named, unless it was measured to be different.

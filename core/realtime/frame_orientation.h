@@ -5,8 +5,8 @@
 //   t = v * line_delay   (PTCEE 26, 27, and beyond)
 // Angles are TRUE (rad): the measured ones divided by the calibrated scales. Frames: base b (FRD),
 // camera c (RDF). An orientation is perturbed as R Exp(xi), xi in the camera frame (PTCEE 5). xi is
-// the error of directions in the image's middle. It includes the error c of the optical centre (px)
-// together with the turn of the axes by c / f that goes with it.
+// the error of directions in the image's middle: an error of the optical centre by c px counts as a
+// turn by c / f, with its correlation to the errors of the axes.
 // Pixels are continuous; the centre of the top-left one is (0.5, 0.5). Covariances are first-order
 // and contain the calibration's. No allocation; plain values; any number of threads may read one.
 
@@ -38,7 +38,7 @@ enum class OrientationMode {
   return "unknown mode";
 }
 
-// Order: pan, tilt, pan rate, tilt rate, pan acceleration, tilt acceleration.
+// Order: pan, tilt, pan rate, tilt rate, pan acceleration, tilt acceleration; rad, rad/s, rad/s^2.
 using MotionCovariance = Matrix<double, 6, 6>;
 
 struct FrameOrientation {
@@ -70,7 +70,7 @@ struct FrameOrientation {
   }
 
   // Direction of pixel u in b at the time of its own row. cov, if not null, is its covariance
-  // (rad^2) in tangent_basis(*d_b) for an exact u.
+  // (rad^2) in tangent_basis(*d_b) for an exact u. kNotFinite with mode kNone, here and below.
   [[nodiscard]] ProjectionStatus direction(const Vector2<double>& u, Vector3<double>* d_b,
                                            Matrix2<double>* cov = nullptr) const;
 

@@ -14,13 +14,13 @@
 
 namespace alidade {
 
-// measured: when the middle row was exposed. frame_time_s: t0. False if a result is not finite;
-// *out is then unchanged.
+// at_middle_row: telemetry when the middle row was exposed. frame_time_s: t0. False if a result is
+// not finite; *out is then unchanged.
 [[nodiscard]] bool pt_orientation(const Calibration& calibration, double frame_time_s,
                                   const InterpolatedPanTilt& at_middle_row, FrameOrientation* out);
 
-// frame_time_s is t0, frame_time_sigma_s its standard deviation. *out is written if
-// has_result(status).
+// frame_time_s is t0, frame_time_sigma_s (s) its standard deviation. The status is the query's, or
+// kNotFinite if a result is not finite. *out is written if has_result(status).
 template <std::size_t Capacity>
 [[nodiscard]] QueryStatus pt_orientation(const Calibration& calibration,
                                          const TelemetryBuffer<Capacity>& telemetry,

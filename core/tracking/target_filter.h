@@ -45,8 +45,8 @@ struct Innovation {
 };
 
 // The state after one measurement: at rest, with this sigma of velocity (m/s or rad/s). Empty if no
-// place of the plane, or no direction, is at the measurement: it is beyond the horizon, or H is
-// singular.
+// place of the plane, or no direction, is at the measurement (it is beyond the horizon, or H is
+// singular), or if the result is not finite.
 [[nodiscard]] std::optional<TargetState> first_state(TargetSpace space,
                                                      const Matrix3<double>& H_measured_from_world,
                                                      const TargetMeasurement& measurement,

@@ -32,7 +32,7 @@ struct ViewRegion {
 }
 
 // Probability that a place is in the region; the distances to the edges are treated as independent.
-// place, cov: in measured coordinates.
+// place, cov: in measured coordinates; cov positive definite.
 [[nodiscard]] inline double probability_in_view(const ViewRegion& region,
                                                 const Vector2<double>& place,
                                                 const Matrix2<double>& cov) {
@@ -47,7 +47,7 @@ struct ViewRegion {
 }
 
 struct TargetFrame {
-  double time_s = 0;  // of exposure; any one clock for all frames
+  double time_s = 0;  // s, of exposure; any one clock for all frames
   Matrix3<double> H_measured_from_world = Matrix3<double>::Identity();
   ViewRegion view;
   double false_alarm_density = 1e-7;  // false alarms of one frame per unit of measured area, > 0

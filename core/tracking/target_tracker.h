@@ -4,8 +4,8 @@
 // frame is put in its place and the frames after it are processed again: the result is that of the
 // right order, and identities stay. A frame with any fault is refused as a whole, with its reason.
 // Identities count from 1 and are never reused. Equal calls give equal results. For one thread. The
-// constructor takes all memory, no call allocates: about max_targets * (300 + 100
-// max_detections) + history_frames * (320 max_targets + 50 max_detections) bytes.
+// constructor takes all memory, no call allocates: about max_targets * (300 + 100 max_detections) +
+// history_frames * (320 max_targets + 50 max_detections) bytes.
 
 #include <cstdint>
 #include <vector>
@@ -27,7 +27,7 @@ struct TargetTrackerOptions {
   double gate_probability = 0.99999;
   int birth_hits = 3;          // sightings that confirm a target
   int birth_looks = 5;         // the number of first looks among which they must be
-  double lose_after_s = 1;     // time in view without being seen
+  double lose_after_s = 1;     // longest time in view without being seen
   double forget_after_s = 60;  // since last seen, in view or not; at least lose_after_s
   double most_sigma = 30;      // m or rad, of the place along its worst direction; beyond: given up
   double most_ahead_s = 0.5;   // limit of a frame's time after now
@@ -36,6 +36,7 @@ struct TargetTrackerOptions {
   int max_targets = 256;       // including unconfirmed ones
   int max_detections = 256;    // of a frame
 
+  // False if a value is invalid. *error, if not null, then says which in one line.
   [[nodiscard]] bool validate(const char** error = nullptr) const;
 };
 
@@ -44,7 +45,7 @@ enum class FrameStatus {
   kTakenLate,            // put in its place, later frames processed again
   kTooLate,              // beyond the history
   kInTheFuture,          // more than most_ahead_s after now
-  kBadFrame,             // not finite, H singular, or density not positive
+  kBadFrame,             // not finite, H singular, density not positive, or a count out of range
   kTooManyDetections,    // more than max_detections
   kDetectionNotFinite,   // place or covariance
   kDetectionCovariance,  // not symmetric and positive definite
@@ -56,7 +57,7 @@ enum class FrameStatus {
 struct FrameAnswer {
   FrameStatus status = FrameStatus::kTaken;
   int detection = -1;  // index of the detection at fault; -1: none is
-  int steps = 0;       // frames processed: 1, more for a late one
+  int steps = 0;       // frames processed: 1, more for a late one, 0 for a refused one
 };
 
 struct Target {
@@ -64,7 +65,7 @@ struct Target {
   TargetState state;           // at the newest frame's time
   double born_s = 0;           // time of its first frame
   double seen_s = 0;           // time of the last frame that saw it
-  double unseen_s = 0;         // duration in view without being seen, since then
+  double unseen_s = 0;         // unseen although in view, since then; a doubtful view counts less
   double in_view = 1;          // probability of being in view of the last frame
   int detection = -1;  // index in the last frame: the one by which it counts as seen; -1: none
   int looks = 0;       // frames that had it in view, until it was confirmed
@@ -76,12 +77,12 @@ class TargetTracker {
   // options must be valid.
   explicit TargetTracker(const TargetTrackerOptions& options);
 
-  // now_s: the present time on the clock of the frames' times.
+  // now_s: the present time on the clock of the frames' times. A refused frame changes nothing.
   [[nodiscard]] FrameAnswer add(const TargetFrame& frame, double now_s);
 
   // In order of birth. Those without identity may be false alarms.
   [[nodiscard]] const std::vector<Target>& targets() const { return targets_; }
-  // Time of the newest frame.
+  // s; time of the newest frame. 0 before the first one.
   [[nodiscard]] double time_s() const { return time_s_; }
   // Births refused because there were max_targets.
   [[nodiscard]] std::int64_t births_refused() const { return births_refused_; }

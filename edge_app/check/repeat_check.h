@@ -1,9 +1,9 @@
 #pragma once
 // Checks whether pictures are sent again. A frame rate converter, a night mode or a grabber repeats
 // a picture if it has no new one, so the true rate is lower than the frames' rate. Equal pictures
-// of a camera at rest show nothing. So a frame is judged only if the head moved the image by
-// kTurning_px from kAbout_s before the frame to kAbout_s after it. Radians, seconds, px. Pure;
-// allocates.
+// of a camera at rest show nothing. So a frame is judged only if the head moved the image by 20 px
+// or more from 0.25 s before the frame to 0.25 s after it, more than the links' delays differ.
+// Radians, seconds, px. Pure; allocates.
 
 #include <cstddef>
 #include <optional>
@@ -24,6 +24,7 @@ struct RepeatNeeds {
 struct RepeatReport {
   std::size_t turning = 0;   // frames while the head turned
   std::size_t repeated = 0;  // of `turning`: equal to the frame before
+  // New pictures a second while the head turned. Empty: fewer than 20 frames came meanwhile.
   std::optional<double> fresh_hz;
   Findings findings;
 };

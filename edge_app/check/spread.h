@@ -12,6 +12,7 @@
 
 namespace alidade {
 
+// All members but `count` in the unit of the values.
 struct Spread {
   double median = 0;
   // 1.4826 times the median distance from the median: sigma, if the values are normal.

@@ -15,7 +15,8 @@ namespace alidade {
 [[nodiscard]] AxisReport measure_axis(const std::vector<PanTiltSample>& samples,
                                       double PanTiltSample::*angle);
 
-// Sets change_hz, the top rates, turning, stale and how long repeats lasted. stale:
+// Sets turning, stale and how long repeats lasted; from eight new values while the head turned on,
+// also change_hz and the top rates. samples: finite, in order of time. stale:
 // find_stale_repeats(samples). Needs the axes' resolutions in *report.
 void measure_turning(const std::vector<PanTiltSample>& samples, const std::vector<bool>& stale,
                      TelemetryReport* report);

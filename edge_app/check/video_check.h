@@ -24,11 +24,11 @@ namespace alidade {
 // A frame without its image.
 struct CheckedFrame {
   FrameStamp stamp;
-  int width = 0;
-  int height = 0;
-  std::optional<double> decode_s;
-  bool interlaced = false;  // its coding
-  bool repeats = false;     // its image equals the one before exactly
+  int width = 0;                   // px
+  int height = 0;                  // px
+  std::optional<double> decode_s;  // s; Frame::decode_s
+  bool interlaced = false;         // its coding
+  bool repeats = false;            // its image equals the one before exactly
 };
 
 struct VideoNeeds {

@@ -13,9 +13,10 @@
 
 namespace alidade {
 
-// stamps: in order of arrival. With sender times, true if the first frame is later than the least
-// late frame of the first kLook_s by no more than jitter. Without sender times, true if there is no
-// burst among the arrivals of the first kLook_s.
+// stamps: in order of arrival; those of the first 10 s are judged. If all of these have sender
+// times, true if the first frame is later than the least late one by no more than jitter. Otherwise
+// true if no two arrivals follow each other in less than 0.4 of the usual interval. Also true for
+// fewer than two frames.
 [[nodiscard]] inline bool begins_fresh(const std::vector<FrameStamp>& stamps) {
   constexpr double kLook_s = 10;
   constexpr double kBurst = 0.4;  // of the usual interval

@@ -4,15 +4,12 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "core/calibration/number_text.h"
-#include "core/model/pupil.h"
 #include "edge_app/commands/calibrate.h"
 #include "edge_app/commands/calibrate_shutter.h"
 #include "edge_app/commands/check.h"
@@ -23,6 +20,7 @@
 #include "edge_app/commands/map_build.h"
 #include "edge_app/commands/map_export.h"
 #include "edge_app/commands/map_info.h"
+#include "edge_app/commands/option_checks.h"
 #include "edge_app/commands/plane.h"
 #include "edge_app/commands/record.h"
 #include "edge_app/commands/replay.h"
@@ -32,62 +30,6 @@
 
 namespace alidade {
 namespace {
-
-// Validators: return what is wrong with a value, or nothing. The library's own validators for
-// numbers print their limits with up to 300 digits.
-std::string is_duration(const std::string& text) {
-  const std::optional<double> value = number_of(text);
-  return value && *value > 0 ? "" : fmt::format("'{}' is not a number of seconds above 0", text);
-}
-std::string is_film_duration(const std::string& text) {
-  const std::optional<double> value = number_of(text);
-  return value && *value > 0 && *value <= kLongestFilm_s
-             ? ""
-             : fmt::format("'{}' is not a number of seconds above 0, up to {:.0f}", text,
-                           kLongestFilm_s);
-}
-std::string is_accuracy(const std::string& text) {
-  const std::optional<double> value = number_of(text);
-  return value && *value >= 0 && *value <= 5
-             ? ""
-             : fmt::format("'{}' is not a number of degrees from 0 to 5", text);
-}
-
-std::string is_turn_sigma(const std::string& text) {
-  const std::optional<double> value = number_of(text);
-  return text == "free" || (value && *value >= 0 && *value <= 10)
-             ? ""
-             : fmt::format("'{}' is neither a number of degrees from 0 to 10 nor free", text);
-}
-
-std::string is_share(const std::string& text) {
-  const std::optional<double> value = number_of(text);
-  return value && *value >= 0 && *value <= 1
-             ? ""
-             : fmt::format("'{}' is not a number from 0 to 1", text);
-}
-
-std::string is_length_px(const std::string& text) {
-  const std::optional<double> value = number_of(text);
-  return value && *value >= 0 && *value <= 1e4
-             ? ""
-             : fmt::format("'{}' is not a number of pixels from 0 to 10000", text);
-}
-
-std::string is_pupil_place(const std::string& text) {
-  const std::optional<double> value = number_of(text);
-  return value && std::abs(*value) <= kFarthestPupil_m
-             ? ""
-             : fmt::format("'{0}' is not a number of metres from -{1:g} to {1:g}", text,
-                           kFarthestPupil_m);
-}
-
-std::string is_scene_distance(const std::string& text) {
-  const std::optional<double> value = number_of(text);
-  return value && *value >= kNearestScene_m
-             ? ""
-             : fmt::format("'{}' is not a number of metres, {:g} or more", text, kNearestScene_m);
-}
 
 void add_run(CLI::App& app, int* exit_code) {
   auto options = std::make_shared<RunOptions>();

@@ -9,7 +9,7 @@
 namespace alidade {
 
 [[nodiscard]] std::string map_text(const SceneMap& map);
-// One line. path: of the map.
+// One line, with a line feed. path: of the map.
 [[nodiscard]] std::string map_json(const SceneMap& map, const std::string& path);
 
 // px, root mean square distance between sightings and the places that the map predicts for them.

@@ -18,7 +18,8 @@ namespace alidade {
 // A lock on an output file, held while a command works. Another command that would write the file
 // fails and names the holder. A `run` that stores its calibrations in the same file holds the same
 // lock. The constructor makes the file's folder. Nothing of the lock stays behind, not even if
-// SIGINT, SIGTERM or SIGHUP ends the program. Where the file system has no locks, none is taken.
+// SIGINT, SIGTERM or SIGHUP ends the program; nor does a folder that it made and that is still
+// empty. Where no lock can be taken (file system without locks, folder not writable), none is.
 // Only one object may exist at a time.
 class OutputLock {
  public:

@@ -35,6 +35,7 @@ std::optional<Item> next_of(Source& source) {
   throw CommandError(kExitFailed, source.error());
 }
 
+// Whether the recording holds video.mkv or frames/.
 [[nodiscard]] bool has_images(const std::string& recording);
 
 // The images of a recording. Its frames come from another source; some of them may have no image.
@@ -44,7 +45,7 @@ class RecordedImages {
   explicit RecordedImages(const std::string& recording);
 
   // The image of the frame with this stamp; empty if there is none. To be called once for each
-  // frame, in order.
+  // frame, in order. Throws CommandError if the images cannot be read on.
   std::optional<Frame> of(const FrameStamp& stamp);
 
   [[nodiscard]] std::vector<std::string> remarks() const { return source_->remarks(); }

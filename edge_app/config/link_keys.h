@@ -22,11 +22,12 @@ inline constexpr NumberRange kSeconds{0.1, 3600, "s"};
 [[nodiscard]] std::string required_choice(YamlSection& section, const std::string& key,
                                           const std::vector<std::string>& names);
 
-// An address with one of the given schemes and without a user or password in it.
+// The key url: an address with one of the given schemes and without a user or password in it.
 [[nodiscard]] std::string required_url(YamlSection& section, const std::string& example,
                                        const std::vector<std::string>& schemes);
 
-// The keys user and password_env.
+// The keys user and password_env (the environment variable that holds the password). Both may be
+// missing. password_env without user, or without such a variable, is an error.
 void read_login(YamlSection& section, std::string* user, std::string* password);
 
 // The keys follow_redirects and auth.

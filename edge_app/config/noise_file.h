@@ -1,7 +1,8 @@
 #pragma once
-// noise.yaml of a recording: the noise of its streams. Every key is optional, and so is the file. A
-// stamp sigma says that the time stamps scatter to both sides of the true time (symmetric jitter).
-// Without a stamp sigma the time stamps are assumed to be late only, as in a live stream.
+// noise.yaml of a recording: the noise of its streams. Every key is optional, and so is the file.
+// pixel_sigma_px is accepted and not used. A stamp sigma says that the time stamps scatter to both
+// sides of the true time (symmetric jitter). Without a stamp sigma the time stamps are assumed to
+// be late only, as in a live stream.
 
 #include <optional>
 #include <string>

@@ -32,8 +32,9 @@ class BaseJudge {
 
   explicit BaseJudge(const BaseJudgeOptions& options = {}) : options_(options) {}
 
-  // found: a result with kOk for the record's frame, which has an orientation. Sets all of *told
-  // except frame and time_s.
+  // found: a result with kOk for the record's frame, which has an orientation. reference_row: px,
+  // row for which its pose holds. Sets change_rad, covariance and moved of *told, and all of
+  // *offset: of telemetry's base in the map's, by this picture, whatever the verdict.
   [[nodiscard]] Verdict judge(const OrientationRecord& record, const Localization& found,
                               double reference_row, ToldBase* told, BaseOffset* offset);
 

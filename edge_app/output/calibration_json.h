@@ -1,5 +1,5 @@
 #pragma once
-// A calibration as JSON, with the names, units and bits of calibration.yaml.
+// A calibration as JSON, with the names and units of calibration.yaml and all digits of a double.
 
 #include <nlohmann/json_fwd.hpp>
 

@@ -11,7 +11,7 @@ namespace alidade {
 // soft, and those of SvgPlot.
 [[nodiscard]] std::string html_page(const std::string& title, const std::string& body);
 
-// A heading and its lines, given as plain text; empty if there are no lines.
+// A heading and its lines; empty if there are no lines. title: HTML; lines: plain text.
 [[nodiscard]] std::string html_list(const std::string& title,
                                     const std::vector<std::string>& lines);
 

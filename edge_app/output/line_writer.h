@@ -26,7 +26,8 @@ class LineWriter {
   LineWriter(const LineWriter&) = delete;
   LineWriter& operator=(const LineWriter&) = delete;
 
-  // The line must end with a line feed. False: no more can be written, see error().
+  // The line must end with a line feed. False: no more can be written, see error(); of a pipe whose
+  // reader has gone, error() is empty.
   [[nodiscard]] bool write(std::string line);
   // Any thread. From now on write() does not wait.
   void interrupt();

@@ -28,13 +28,13 @@ struct LiveStateOptions {
   double kept_s = 10;           // s of time_s; how long records with a frame are kept
   std::size_t max_kept = 2048;  // most records with a frame that are kept
   std::size_t max_lines = 512;  // most lines by which a reader may be behind
-  double history_s = 60;
-  double history_step_s = 0.1;
+  double history_s = 60;        // s; how long samples for plots are kept
+  double history_step_s = 0.1;  // s; least time from sample to sample
 };
 
-// One time step of the plots.
+// One time step of the plots: the values of its first record, except the latency.
 struct HistorySample {
-  double time_s = 0;
+  double time_s = 0;  // s, host clock; the receive time if the record has no other
   RecordMode mode = RecordMode::kNone;
   std::optional<double> pan_rad;
   std::optional<double> tilt_rad;
@@ -49,6 +49,7 @@ struct ReaderCounters {
   std::int64_t lost = 0;
 };
 
+// kNoneYet: no frame with a time is kept at all. *record is filled only if kFound.
 enum class FrameSearch { kFound, kNotKept, kNoneYet };
 
 class LiveState final : public RecordSink {

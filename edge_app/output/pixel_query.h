@@ -29,9 +29,9 @@ inline constexpr std::size_t kMaxQueryBytes = std::size_t{64} << 10;
 
 struct DirectionQuery {
   FrameChoice which;
-  std::vector<Vector2<double>> pixels;
-  double pixel_sigma_px = 0;         // of each coordinate; 0: pixels are exact
-  std::optional<double> distance_m;  // of what is seen there; empty: far away
+  std::vector<Vector2<double>> pixels;  // px
+  double pixel_sigma_px = 0;            // of each coordinate, to 1000; 0: pixels are exact
+  std::optional<double> distance_m;     // of what is seen, kNearestScene_m to 1e9; empty: far
 };
 
 struct PixelQuery {
@@ -39,13 +39,14 @@ struct PixelQuery {
   std::vector<Vector3<double>> directions;  // unit vectors, base frame
 };
 
-// False with one line in *error.
+// *query must be empty before. False with one line in *error; *query is then undefined.
 [[nodiscard]] bool parse_direction_query(const std::string& body, DirectionQuery* query,
                                          std::string* error);
 [[nodiscard]] bool parse_pixel_query(const std::string& body, PixelQuery* query,
                                      std::string* error);
 
-// The answer as one line of JSON with a line feed. The record must have a frame and an orientation.
+// The answer as one line of JSON with a line feed. The record must have a frame, a time and an
+// orientation. A pixel or direction without an answer gets `error` in place of it.
 // With a plane, each direction also has its place on the plane. scene_nearness: of the scene for
 // which the calibration was made (pupil.h), for directions at a distance.
 [[nodiscard]] std::string direction_answer(const OrientationRecord& record,

@@ -1,6 +1,6 @@
 #pragma once
-// RecordWriter: writes records as lines to a file descriptor. Of `run` to stdout alone; to a file in
-// `replay` only, as a write to a disk waits and a failure ends the program. Slow readers: see
+// RecordWriter: writes records as lines to a file descriptor. In `run` to stdout alone; to a file
+// in `replay` only, as a write to a disk waits and a failure ends the program. Slow readers: see
 // line_writer.h.
 
 #include <cstddef>

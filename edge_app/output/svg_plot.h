@@ -1,10 +1,10 @@
 #pragma once
-// SvgPlot: one diagram as an <svg> element. The page defines the colours of the classes a, b, bad
-// and soft (`--a` and so on). Axes have round ticks and labels with units. Series are drawn in the
-// order in which they are added. Points beyond the vertical range are drawn at its edge. Points
-// that cover each other are drawn once; of very many points only each n-th is drawn. A plot without
-// dots, lines and rectangles says "no data". The element's class is `wide` or `half`, for narrow
-// screens. Pure; allocates.
+// SvgPlot: one diagram as an <svg> element. A `colour` is one of the classes a, b, bad, ink and
+// faint, which html_page() defines. Axes have round ticks and labels with units. Series are drawn
+// in the order in which they are added. What lies beyond the vertical range is drawn at its edge;
+// dots beyond the horizontal range, or not finite, are left out. Dots that cover each other are
+// drawn once; of more than 6000 only each n-th. A plot without dots, lines and rectangles says "no
+// data". The element's class is `wide` or `half`, for narrow screens. Pure; allocates.
 
 #include <string>
 #include <vector>
@@ -30,16 +30,20 @@ class SvgPlot {
   // Size in px. Axes must be finite with low < high. y_down: y grows downwards, as in images.
   SvgPlot(int width, int height, PlotAxis x, PlotAxis y, bool y_down = false);
 
+  // diameter: px.
   void dots(const std::vector<PlotPoint>& points, const char* colour, double diameter = 2.2);
+  // Of lines, areas and all below, coordinates must be finite.
   void line(const std::vector<PlotPoint>& points, const char* colour);
   // Fills the area between the lines `low` and `high`, without drawing these lines.
   void area(const std::vector<PlotPoint>& low, const std::vector<PlotPoint>& high,
             const char* colour);
+  // A line from `from`, where it has a dot, to `to`.
   void arrow(const PlotPoint& from, const PlotPoint& to);
   // A grey band from `low` to `high` over the whole width.
   void band(double low, double high);
   // Shades the range of x from `from` to `to`, which has no data, over the whole height.
   void shade(double from, double to);
+  // A horizontal line over the whole width.
   void level(double y);
   void rectangle(const PlotPoint& from, const PlotPoint& to, const char* colour, double opacity);
   // Short strokes on the x axis.

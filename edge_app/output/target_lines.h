@@ -21,7 +21,8 @@ class TargetLines {
     std::shared_ptr<const std::string> json;  // without line feed
   };
 
-  // Does not own `file`; null: no file.
+  // Does not own `file`; null: no file. If a line cannot be written, that is logged, and the file
+  // gets no more.
   explicit TargetLines(LineWriter* file) : file_(file) {}
 
   void take(const TargetsState& state);

@@ -2,8 +2,8 @@
 // LinkWatch: the health of a source's link, for other threads while one thread reads the source:
 // whether it is connected, why not, how often it came back, how old its last item is, and how many
 // items come a second.
-//   rate  1 / mean interval between items over the last kMemory, however unevenly they come; no
-//         more than 1 / age, so that it falls when nothing comes
+//   rate  1 / mean interval between items over about the last kMemory, however unevenly they come;
+//         no more than 1 / age, so that it falls when nothing comes
 // The reading thread reports to this object: item() takes no lock, lost() and waiting() take one to
 // copy a string. Any thread may call now(). Times are seconds of the host's CLOCK_MONOTONIC.
 

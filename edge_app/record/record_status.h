@@ -44,7 +44,7 @@ enum class RecordStatus : std::uint8_t {
   kImageTooLate,          // mode PT: other frames waited behind this one, so it lost its image
   kImageRepeated,  // the image before was sent again while the camera turned (RepeatedImages)
   kOtherZoom,      // no calibration for the zoom that the pan/tilt source reports
-  kNotFinite,      // a stamp is not a finite number
+  kNotFinite,      // a stamp or an angle, or what follows from them, is not a finite number
   kNotLocalized,   // without telemetry: where the camera looks is not known, or no longer known
   kNotCalibrated,  // mode PT: no calibration, or a withdrawn one: landmarks are not looked for
   kZoomMoves,  // mode PT: the lens moves, or has just left the zoom curve; no map to follow it with

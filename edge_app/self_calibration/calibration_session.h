@@ -4,8 +4,8 @@
 // exceeds the limits is forgotten, the oldest first.
 //
 // Every tenth frame is held out: a calibration of the session does not use this frame and is tested
-// on it. The frame's time is interpolated between its neighbours' times, by the sender's clock or
-// by the sequence numbers.
+// on it. The frame's time is interpolated between its neighbours' times, by the sender's clock,
+// else by the sequence numbers, else it is their middle.
 // Radians, seconds, px. Allocates. One thread.
 
 #include <cstddef>

@@ -13,7 +13,7 @@
 //   noise     Receive times err to both sides if the input's noise has a stamp sigma. Otherwise
 //             they are only ever late, as in `run` and `replay`.
 //   restarts  A sender's clock restarts at a reconnection: only the longest part without a
-//             reconnection is used.
+//             reconnection is used. Polled telemetry, whose times are the host's, is used whole.
 
 #include <string>
 #include <vector>
@@ -30,8 +30,9 @@ namespace alidade {
 // time.
 [[nodiscard]] double stamp_of(const PanTiltSample& sample, bool polled);
 
-// Appends frames to input->frames (samples to input->telemetry), sets what is known of their stamps
-// in *options and in input->noise, and adds a line to *remarks for whatever was left out.
+// Appends frames to input->frames (samples to input->telemetry), in order of arrival, sets what is
+// known of their stamps in *options and in input->noise, and adds a line to *remarks for whatever
+// was left out. input->noise must hold what the user states.
 void add_frames(std::vector<FrameStamp> stamps, CalibrationInput* input,
                 CalibrationOptions* options, std::vector<std::string>* remarks);
 void add_telemetry(std::vector<PanTiltSample> samples, CalibrationInput* input,

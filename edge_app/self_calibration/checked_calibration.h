@@ -5,10 +5,10 @@
 //   excess      = max(1, hold_out / unit): by how much the calibration predicts worse than it
 //               claims
 //   covariance  = excess^2 times that of calibrate(). With a free optical centre only the part that
-//               is not from priors grows. The clock offset's variance also includes the error that
-//               all polls of the telemetry share.
-// The held-out frames reveal errors of the model: the trajectory may be coarser than the motion,
-// and the errors of patches may be alike.
+//               is not from priors grows. Added: what a known calibration's centre leaves open, and
+//               to the clock offset's variance the error that all polls of the telemetry share.
+// The held-out frames show errors that residuals do not: a trajectory that is coarser than the
+// motion, or patches whose errors are alike in neighbouring frames.
 // Pure; allocates; takes tenths of a second.
 
 #include <functional>
@@ -22,23 +22,25 @@
 
 namespace alidade {
 
-// A calibration beyond one of these is not believed.
+// A calibration beyond one of these is refused; so is one without anything to compare.
 struct CalibrationChecks {
-  double worst_hold_out = 2;         // hold_out over `unit`
+  double worst_hold_out = 2;         // hold_out / unit
   double worst_pixel_ratio = 4;      // residuals over the tracker's own sigmas
   double worst_telemetry_ratio = 4;  // residuals over the stated noise
 };
 
 struct CheckedCalibrationOptions {
-  int width = 0;                  // px
-  int height = 0;                 // px
-  CalibrationOptions adjustment;  // priors, if there is no known calibration
-  KnownCamera camera;             // what is known of the camera beforehand; likewise
+  int width = 0;   // px
+  int height = 0;  // px
+  // A known calibration replaces its priors of focal length, distortion, line delay and axes, its
+  // optical centre, and, if has_clock_offset, that of the clock offset.
+  CalibrationOptions adjustment;
+  KnownCamera camera;  // used only without a known calibration
   CalibrationNoise noise;
   CalibrationChecks checks;
   std::size_t max_observations = 15000;
-  // Published parameters lose their correlations when they become priors. Sigmas this much larger
-  // make up for it.
+  // The sigmas of a known calibration are multiplied by this: as priors its parameters lose their
+  // correlations.
   double prior_inflation = 1.5;
   std::function<bool()> is_cancelled;  // asked between steps; empty: never cancelled
 };
@@ -50,15 +52,18 @@ struct KnownCalibration {
 };
 
 struct CheckedCalibration {
-  CalibrationResult result;          // without the zoom
-  std::string refusal;               // empty: it may be published
-  std::optional<double> hold_out;    // held_out_error(); empty: nothing could be compared
-  std::vector<std::string> remarks;  // what was known beforehand but not used
-  CalibrationOptions adjustment;     // as used, with its priors
-  double common_clock_sigma_s = 0;   // part of the clock offset's sigma: the error of all polls
+  CalibrationResult result;        // calibration.zoom is not set
+  std::string refusal;             // empty: it may be published
+  std::optional<double> hold_out;  // held_out_error(); empty: nothing could be compared
+  // What of options.camera was not used, and why; not what was left out of the session's data.
+  std::vector<std::string> remarks;
+  // Set only if result.ok():
+  CalibrationOptions adjustment;    // as used, with its priors
+  double common_clock_sigma_s = 0;  // s, part of the clock offset's sigma: the error of all polls
 };
 
-// known: the prior; null: calibrated from the data and options.camera. Failure is a refusal.
+// known: the prior; null: calibrated from the data, options.adjustment and options.camera. A
+// failure of calibrate(), or its cancellation, is a refusal, too; result.status tells which.
 [[nodiscard]] CheckedCalibration calibrate_session(const CalibrationSession& session,
                                                    const CheckedCalibrationOptions& options,
                                                    const KnownCalibration* known);

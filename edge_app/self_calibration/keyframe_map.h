@@ -23,18 +23,20 @@ struct Keyframe {
   std::shared_ptr<const PackedImage> image;
 };
 
-// keyframes: in order of time, within the trajectory's span. An empty map if none can be used.
+// keyframes: in order of time, within the span of result.trajectory. If none can be used, the map
+// has no landmarks.
 [[nodiscard]] MapState map_from_keyframes(const CalibrationResult& result,
                                           const std::vector<Keyframe>& keyframes);
 
-// The trajectory at a time (image clock), as telemetry would measure it (angles times scale), for
-// OeMode::process(). sigma_px: sigma of the angles as a motion of the image. The sigma of the rates
-// is 20 times the angles' per second.
+// The trajectory at a time (image clock, within its span), for OeMode::process(): angles, rates and
+// accelerations as telemetry would measure them (true ones times scale), angles wrapped. sigma_px:
+// one standard deviation of either angle, given as the motion of the image's centre, px. That of
+// either rate is the angle's times 20/s.
 [[nodiscard]] InterpolatedPanTilt predict(const CalibrationResult& result, double time_s,
                                           double sigma_px);
 
-// rad^2, of (pan, tilt): how well trajectory and map are tied to the base frame. Derivation:
-// docs/derivations.md.
+// rad^2, of (pan, tilt), diagonal: of the offset from the base frame that the whole trajectory and
+// map may have. From the telemetry's residuals, without outliers. Derivation: docs/derivations.md.
 [[nodiscard]] Matrix2<double> tie_covariance(const CalibrationResult& result);
 
 }  // namespace alidade

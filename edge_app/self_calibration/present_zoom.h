@@ -16,7 +16,7 @@ namespace alidade {
 class PresentZoom {
  public:
   enum class Change {
-    kNone,
+    kNone,    // no reading, or another zoom's that may be a glitch
     kSilent,  // no reading for zoom_silence_s, though there were some before
     kJitter,  // the jitter is known now: readings that were taken for other zooms were this one
     kSame,    // a reading of this zoom

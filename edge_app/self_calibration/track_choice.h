@@ -33,13 +33,14 @@ enum class Untracked {
   kTooShort,     // followed through fewer than kMinSightings frames
   kBeyondLimit,  // left out because of max_observations
 };
-// By the frame's name.
+// By CalibrationFrame::frame.
 using UntrackedFrames = std::unordered_map<std::int64_t, Untracked>;
 
 inline constexpr int kMinSightings = 5;
 inline constexpr std::size_t kMaxObservations = 30000;
 inline constexpr std::size_t kLeastInAFrame = 12;
-// *untracked, if not null: gets each frame of which no observation is left, with the reason.
+// *untracked, if not null: gets each frame of the observations of which none is left, as kTooShort
+// or kBeyondLimit.
 [[nodiscard]] std::vector<CalibrationObservation> choose_tracks(
     std::vector<CalibrationObservation> observations,
     std::size_t max_observations = kMaxObservations, UntrackedFrames* untracked = nullptr);

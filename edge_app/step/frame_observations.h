@@ -13,7 +13,8 @@ namespace alidade {
 
 // Sets points and count, and leaves the rest. Points that exceed the room are left out.
 void get_tracks(const StartUpTracker& tracker, FrameTracks* tracks);
-// Also sets oe_status. No points unless it is kOk.
+// Also sets oe_status. No points unless it is kOk; of the landmarks found, only inliers that are no
+// edges (track_sigma()).
 void get_tracks(const OeMode& mode, FrameTracks* tracks);
 
 void get_landmarks(const StartUpTracker& tracker, FrameLandmarks* landmarks);

@@ -77,7 +77,8 @@ void OrientationStep::add_telemetry(const PanTiltSample& sample) {
   if (has_zoom && zoom_.take(sample.latest_time_s, *sample.zoom)) note_curve_here();
   if (!taken.time_s) return;
   if (has_zoom) zoom_.place(*taken.time_s);
-  link_delay_.add(TelemetrySample{*taken.time_s, 0, sample.pan_rad, sample.tilt_rad});
+  link_delay_.add(TelemetrySample{*taken.time_s, 0, taken.angle.pan, taken.angle.tilt},
+                  taken.error_variance);
   settle_pending_frames();
 }
 

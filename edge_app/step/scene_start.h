@@ -24,7 +24,9 @@ class SceneStart {
   // The frame added last is to be localized. *angular_velocity: rad/s, its camera frame. False: the
   // camera cannot be followed from this frame on.
   [[nodiscard]] bool ask(std::int64_t frame, Vector3<double>* angular_velocity);
+  // The result for the frame of ask(); one for another frame is ignored.
   void settle(const ToldBase& told);
+  // Ends all this; ask() begins anew.
   void forget();
 
   // A frame was localized, and the camera was followed since.

@@ -59,20 +59,23 @@ TelemetryIntake::Taken TelemetryIntake::add(const PanTiltSample& sample) {
     timed.time_s = sample.latest_time_s - width_s / 2;
     timed.time_sigma_s = width_s > 0 ? width_s / std::sqrt(12.0) : options_.stamp_sigma_s;
   }
-  measured_[measured_count_ % kMeasuredKept] = timed;
-  ++measured_count_;
   step_.add(timed.pan, timed.tilt);
   if (resolution_shown() != resolution_) {
     resolution_ = resolution_shown();
     store_again();
-  } else {
-    store(timed);
   }
+  measured_[measured_count_ % kMeasuredKept] = timed;
+  ++measured_count_;
+  const TelemetrySample corrected = store(timed);
   out.time_s = timed.time_s;
+  InterpolatedPanTilt here;
+  here.angle = out.angle = {corrected.pan, corrected.tilt};
+  correction_.add_left(&here);
+  out.error_variance = here.error_variance;
   return out;
 }
 
-void TelemetryIntake::store(const TelemetrySample& measured) {
+TelemetrySample TelemetryIntake::store(const TelemetrySample& measured) {
   const std::optional<double> newest_s = samples_.newest_time();
   if (newest_s && measured.time_s > *newest_s + options_.limits.max_gap_s) {
     correction_.forget_state();
@@ -80,6 +83,7 @@ void TelemetryIntake::store(const TelemetrySample& measured) {
   TelemetrySample corrected = measured;
   correction_.correct(&corrected);
   static_cast<void>(samples_.push(corrected));
+  return corrected;
 }
 
 void TelemetryIntake::correct_by(const Mechanics<double>& mechanics, const TelemetryError& error) {

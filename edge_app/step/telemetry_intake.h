@@ -41,6 +41,10 @@ class TelemetryIntake {
   struct Taken {
     bool restarted = false;        // earlier times cannot be asked for any more
     std::optional<double> time_s;  // telemetry time; empty: the sample is left out
+    // If there is a time. rad, measured units, without the known errors of the angles, and the
+    // variance of what is left of these (pan, tilt), rad^2.
+    PanTilt<double> angle;
+    Vector2<double> error_variance = Vector2<double>::Zero();
   };
   Taken add(const PanTiltSample& sample);
   // The connection was lost. The next sample ends that state.
@@ -69,9 +73,9 @@ class TelemetryIntake {
 
   [[nodiscard]] Samples empty(bool filtered) const;
   [[nodiscard]] bool is_stalled_poll(const PanTiltSample& sample);
-  // Corrects a sample and puts it into the buffer. The buffer counts the samples that it refuses (a
-  // duplicate, a value that is not finite); the records' sigma shows the effect.
-  void store(const TelemetrySample& measured);
+  // Corrects a sample, puts it into the buffer, and returns it. The buffer counts the samples that
+  // it refuses (a duplicate, a value that is not finite); the records' sigma shows the effect.
+  TelemetrySample store(const TelemetrySample& measured);
   // Fills the buffer anew with the latest samples as measured.
   void store_again();
   // rad. White noise of a quarter of a step or more dithers the readings: the result is then 0.

@@ -24,7 +24,7 @@ struct ToldBase {
   bool is_whole = false;
   std::array<double, 9> R_base_from_camera{};
   std::array<double, 9> R_covariance{};
-  double log_f = 0;  // f in px
+  double log_f = 0;  // likewise: logarithm of the focal length in px, and its variance
   double log_f_variance = 0;
 };
 static_assert(std::is_trivially_copyable_v<ToldBase>);

@@ -1,13 +1,13 @@
 #pragma once
-// TurnChain: how a camera has turned since some frame, without telemetry, by points followed from
-// frame to frame (start_up_tracker.h). For each point with ray b in the camera frame:
-//   b_before = Exp(s w) b_now,  s = 1 + l (v_now - v_before) / T
-// w is the rotation vector from this frame's middle row to the middle row of the frame before, T
-// the time between the two. l is the line delay: a rolling shutter that turns at an even rate does
-// no harm.
-// Robust least squares (Cauchy): points that move by themselves count little. The steps multiply,
-// R_from_now = R_from_before Exp(w), with the covariance of all steps, of R Exp(xi), xi in this
-// frame's camera frame. A step with too few points, or after too long a time, breaks the chain.
+// TurnChain: how a camera has turned since some frame (`first`), without telemetry, by points
+// followed from frame to frame (start_up_tracker.h). A step leads from the frame `before` to the
+// frame added last (`now`). For each point in both, with rays b in their camera frames:
+//   b_before = Exp(s w) b_now,  s = 1 + l (v_now - v_before) / T,  R_before_from_now = Exp(w)
+// w is of the middle rows, T the time between them, l the line delay, v a row: exact for a camera
+// that turns at an even rate. Robust least squares (Cauchy): points that move by themselves count
+// little. R_first_from_now = R_first_from_before Exp(w); its covariance is of R Exp(xi), xi in the
+// camera frame of `now`. No step, and so an end of the chain: fewer than 12 common points or half
+// of their weight, T not in (0, 0.5 s), or a bad fit.
 // Radians, seconds. Fixed memory; no allocation. One thread.
 
 #include <array>
@@ -20,21 +20,26 @@ namespace alidade {
 
 class TurnChain {
  public:
-  // The next frame's points; reads tracks.time_s and the points.
+  // The next frame's points, in any order; reads tracks.time_s and the points. Ids must be those of
+  // one tracker.
   void add(const Calibration& calibration, const FrameTracks& tracks);
-  // Begins the chain at the frame added last. False: no step led to that frame.
+  // Begins the chain at the frame added last, which becomes `first`. False: no step led to that
+  // frame, and there is no chain.
   [[nodiscard]] bool begin();
+  // Ends the chain and forgets the points: no step leads to the next frame.
   void forget();
 
-  // rad/s, camera frame, of the frame added last; empty if no step led to it.
+  // rad/s, of `now` against the world, in its camera frame: the mean over the last step. Empty if
+  // no step led to the frame added last.
   [[nodiscard]] const std::optional<Vector3<double>>& angular_velocity() const { return velocity_; }
-  // s, of the last step: from the frame before to the frame added last.
+  // Only if angular_velocity() is set. s, of the last step: T.
   [[nodiscard]] double step_s() const { return step_s_; }
-  // (rad/s)^2, of the mean rate over the step.
+  // Likewise. (rad/s)^2, of that mean rate.
   [[nodiscard]] const Matrix3<double>& velocity_covariance() const { return velocity_covariance_; }
 
+  // Steps led from `first` to the frame added last without a gap.
   [[nodiscard]] bool holds() const { return holds_; }
-  // If holds(): from the frame added last to the first one, and its covariance, rad^2.
+  // Only if holds(). The covariance is in rad^2, without errors of the lens.
   [[nodiscard]] const Matrix3<double>& R_first_from_now() const { return R_first_from_now_; }
   [[nodiscard]] const Matrix3<double>& covariance() const { return covariance_; }
 

@@ -42,8 +42,8 @@ struct LensEstimate {
 [[nodiscard]] std::string format_camera_info(const PatternCalibration& calibration,
                                              const LensNotes& notes);
 
-// A line time_s,x_m,y_m,z_m,q_x,q_y,q_z,q_w for each frame used: the camera in the pattern's frame,
-// when row 0 was exposed.
+// CSV, with a header: a line time_s,x_m,y_m,z_m,q_x,q_y,q_z,q_w for each frame used: the camera's
+// place in the pattern's frame, and R_pattern_from_camera, when row 0 was exposed.
 [[nodiscard]] std::string format_trajectory(const PatternCalibration& calibration,
                                             const PatternData& data);
 

@@ -165,6 +165,9 @@ bool SceneMapFile::is_of(int width, int height, std::string* error) const {
 bool SceneMapFile::replace(const SceneMap& map, std::string* error) {
   set_up_log(&database_);
   SqliteTransaction transaction(&database_, true);
+  if (database_.failed()) return refuse_failure(error);
+  // Another process may have written: its next update must see that the map is another one.
+  if (!read_scene(&scene_, error)) return false;
   const bool other_tables = database_.number_of("PRAGMA user_version") != kSceneMapFormat;
   for (const char* table : {"sighting", "picture", "landmark", "keyframe", "lens_rest",
                             "lens_point", "lens_knot", "scene"}) {

@@ -52,7 +52,8 @@ class SceneMapFile {
 
   // One transaction. Refused if another process has written since this object read or wrote.
   [[nodiscard]] bool update(const MapChange& change, std::string* error);
-  // Replaces the whole map by another one, which is_valid(), in one transaction.
+  // Replaces the whole map by another one, which is_valid(), in one transaction, also if another
+  // process has written.
   [[nodiscard]] bool replace(const SceneMap& map, std::string* error);
 
  private:

@@ -1,8 +1,7 @@
 #pragma once
 // Writes the tables of scene.map, row by row, and keeps sums and counts of the scene row up to
 // date. For use inside a transaction. A failure is the database's (SqliteDatabase::failed()); after
-// a
-// failure nothing is written.
+// a failure nothing is written.
 
 #include <cstdint>
 

@@ -5,8 +5,9 @@
 // sent them. If no detector could judge the picture, nothing is sent.
 // Scores become 0 to 1, but are no probabilities: of motion the share of the largest possible
 // score; of a person 1 / (1 + e^-s), s the distance from the SVM's plane. A box whose middle lies
-// in a box of an earlier detector is taken for the same thing and left out. Memory is taken with
-// the first picture; all others must have its size. For the detector thread, except for report().
+// in a box of an earlier detector is taken for the same thing and left out, and so are the last
+// boxes beyond tracking.max_detections. Memory is taken with the first picture; all others must
+// have its size. For the detector thread, except for report().
 
 #include <cstdint>
 #include <memory>
@@ -41,7 +42,7 @@ struct BuiltInDetectorOptions {
 struct DetectorCounters {
   std::int64_t pictures = 0;  // looked at
   std::int64_t unjudged = 0;  // of these, not judged
-  std::int64_t boxes = 0;     // found
+  std::int64_t boxes = 0;     // found, also those that were left out
 };
 
 struct DetectorsReport {

@@ -33,14 +33,14 @@ struct DetectedFrame {
 // What became of a frame.
 enum class DetectionStatus {
   kTaken,
-  kTakenLate,  // put in order of time; later frames are processed again
-  kMalformed,  // cannot be read
-  kTooManyBoxes,
+  kTakenLate,      // put in order of time; later frames are processed again
+  kMalformed,      // cannot be read
+  kTooManyBoxes,   // more than tracking.max_detections
   kUnknownFrame,   // not among the frames kept
   kFrameNotYet,    // later than the newest frame
   kTooLate,        // over tracker.history_s, or history_frames, behind the newest one taken
   kNoOrientation,  // its record has no orientation
-  kRepeated,       // the frame's detections have come already
+  kRepeated,       // detections of a frame of the same time have come already
   kNoGeometry,     // its picture and the world do not fit together
   kQueueFull
 };
@@ -55,7 +55,9 @@ inline constexpr int kDetectionStatusCount = static_cast<int>(DetectionStatus::k
 // One word, for metrics.
 [[nodiscard]] const char* label_of(DetectionStatus status);
 
-// Why a box cannot be used. It is left out; the other boxes of the frame count.
+// Why a box cannot be used. It is left out; the other boxes of the frame count. kBadScore: not 0 to
+// 1. kNoSize: width or height not above 0. kTooLarge: more than twice the picture's width or
+// height. kOutside: the box's middle is not in the picture. The first that holds.
 enum class BoxFault { kNotFinite, kBadScore, kNoSize, kTooLarge, kOutside };
 inline constexpr int kBoxFaultCount = static_cast<int>(BoxFault::kOutside) + 1;
 

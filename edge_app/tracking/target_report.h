@@ -50,7 +50,7 @@ struct TargetList {
                                                        const OrientationRecord& record);
 
 // The covariance that a place seen at pixel u has from calibration and plane, m^2 (X, Y) or rad^2
-// (azimuth, elevation). False: the pixel has no place.
+// (azimuth, elevation). False: the pixel has no place, or it is at a pole.
 [[nodiscard]] bool shared_covariance(const FrameOrientation& shared_frame,
                                      const PlaneEstimate* plane, const Vector2<double>& u,
                                      Matrix2<double>* cov);

@@ -64,7 +64,7 @@ struct TrackedTarget {
 struct TargetsState {
   std::int64_t updates = 0;  // frames taken so far
   TargetSpace space = TargetSpace::kPlane;
-  double acceleration_density = 0;
+  double acceleration_density = 0;             // m^2/s^3 on a plane, rad^2/s^3 on the sphere
   std::shared_ptr<const PlaneEstimate> plane;  // null on the sphere
   double time_s = 0;                   // s, host clock, of the middle row of the record's frame
   OrientationRecord record;            // of the newest frame taken

@@ -39,7 +39,8 @@ Claims claims_of(const std::vector<PairMean>& pairs, const std::vector<SeenFrame
   return out;
 }
 
-// Of two pairs by their indices. Errors of pairs that share no frame are alike by the calibration alone.
+// Of two pairs by their indices. Errors of pairs that share no frame are alike by the calibration
+// alone.
 Matrix2<double> pair_covariance(const std::vector<PairMean>& pairs, std::size_t index_a,
                                 std::size_t index_b, const Claims& claims) {
   const PairMean& a = pairs[index_a];

@@ -42,7 +42,8 @@ struct ClaimResult {
   double log_chance = 0;     // natural; of a ratio at least as large, if the sigmas hold
 };
 
-// Means, weighted by the places' noise. noise_factor: by which the places' variances are too small.
+// Means, weighted by the places' noise. noise_factor: >= 1, by which the places' variances are too
+// small. Pairs whose mean is not finite are left out.
 [[nodiscard]] std::vector<PairMean> pair_means(const std::vector<PairRows>& pairs,
                                                double noise_factor);
 

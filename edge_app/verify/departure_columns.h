@@ -13,7 +13,7 @@ namespace alidade {
 // A column that shifts one quantity of each frame by a known number.
 struct FrameColumn {
   enum class What { kPan, kTilt, kFocalLength } what = What::kPan;
-  std::vector<double> of_frame;  // by frame: the shift for an amplitude of 1
+  std::vector<double> of_frame;  // by frame: the shift for an amplitude of 1; rad, or 1 of log f
 };
 
 struct DepartureColumns {
@@ -24,7 +24,8 @@ struct DepartureColumns {
   [[nodiscard]] int count() const { return static_cast<int>(parameters.size() + columns.size()); }
 };
 
-// In the order of Departure. A curve has no columns if the frames do not range over its knots.
+// In the order of Departure. A curve has no columns if the frames' angles or times range over less
+// than 1e-3 rad or s.
 [[nodiscard]] std::vector<DepartureColumns> all_departures(const std::vector<SeenFrame>& frames);
 
 }  // namespace alidade

@@ -164,8 +164,8 @@ Stacked stack(const std::vector<Seen>& all, const Vector3<double>& turned,
   return out;
 }
 
-// The rows' covariance. alike: all frames have the same errors, and all zooms; else only the rows of
-// one frame, and of one zoom.
+// The rows' covariance. alike: all frames have the same errors, and all zooms; else only the rows
+// of one frame, and of one zoom.
 Eigen::MatrixXd covariance_of(const Stacked& all, bool alike) {
   Eigen::MatrixXd of_motion = all.of_motion * all.of_motion.transpose();
   Eigen::MatrixXd of_parameters = all.of_parameters * all.of_parameters.transpose();

@@ -1,12 +1,13 @@
 #pragma once
-// Directions that are known from outside: surveyed points, a star, the horizon. A table names pixels
-// of frames and where they look; this file compares them with what each mode says of those pixels.
+// Directions that are known from outside: surveyed points, a star, the horizon. A table names
+// pixels of frames and where they look; here they are compared with what each mode says of them.
 //   r = the angle from the seen direction to the known one, to the right and up; of a horizon, up
 //   C = stated sigma^2 + what the frame and the calibration claim
 // The table's axes are those of the platform, but for a turn: stated, stated with a sigma, or
 // estimated. With W = the inverse of C's blocks, r^T W r / trace(W C) is the square of the ratio,
-// judged as in claim_check.h. Frames' errors may be alike or not, calibrations' of two zooms too: of
-// both the larger trace and the smaller freedom count. rad, px. Pure, but for the table; allocates.
+// judged as in claim_check.h. Frames' errors may be alike or not, calibrations' of two zooms too:
+// of both the larger trace and the smaller freedom count. rad, px. Pure, but for the table.
+// Allocates.
 
 #include <cstdint>
 #include <limits>

@@ -2,7 +2,9 @@
 // SeenFrame: a frame of the recording with its image and its orientation by OE mode, by PT mode,
 // and by PT mode with the samples after the frame, which a live step does not have yet.
 // FrameCollection: the frames of a replay that are compared with each other, evenly over the
-// recording, as many as fit into 256 MB. Allocates. One thread.
+// recording: at most 160, and as many as fit into 256 MB. A frame without image, in the first
+// second, or for which telemetry has no certain answer is replaced by the next. Allocates. One
+// thread.
 
 #include <cstddef>
 #include <cstdint>

@@ -22,8 +22,9 @@ namespace alidade {
 enum class Verdict {
   kHolds,         // no comparison contradicts the sigmas
   kContradicted,  // a comparison does, beyond chance
-  // Fewer than kLeastPairs pairs or kLeastFreedom independent numbers; or, of a departure, a test
-  // that would show only twenty times the claimed sigma.
+  // Of claims: fewer than kLeastPairs pairs or kLeastFreedom independent numbers. Of a departure:
+  // fewer pairs, nothing of it to be seen, or a test that would show only twenty times the claimed
+  // sigma. Of known directions: too few for the turn, or less than kLeastShare.
   kNotJudged
 };
 

@@ -17,7 +17,7 @@ ordered_json to_json(const ClaimComparison& comparison) {
   const ClaimResult& r = comparison.result;
   ordered_json json;
   json["returns"] = name_of(comparison.kind);
-  json["mode"] = comparison.from == OrientationFrom::kLandmarks ? "OE" : "PT";
+  json["mode"] = mode_of(comparison.from);
   json["verdict"] = to_string(comparison.verdict);
   json["pairs"] = r.pairs;
   json["frames"] = r.frames;
@@ -77,7 +77,7 @@ void add_turn(const KnownResult& result, ordered_json* json) {
 ordered_json to_json(const KnownComparison& comparison) {
   const KnownResult& r = comparison.result;
   ordered_json json;
-  json["mode"] = comparison.from == OrientationFrom::kLandmarks ? "OE" : "PT";
+  json["mode"] = mode_of(comparison.from);
   json["verdict"] = to_string(comparison.verdict);
   json["directions"] = r.offsets.size();
   json["rms_px"] = r.rms_px;

@@ -61,9 +61,8 @@ std::string claims_table(const Verification& v) {
     out += fmt::format(
         "<tr><td>{}</td><td>{}</td><td>{}</td><td>{:.0f}</td><td>{:.3f}</td><td>{:.5f}</td>"
         "<td>{:.3f}</td><td>{:.2f}</td><td>{:.2f} to {:.2f}</td><td>{}</td></tr>\n",
-        name_of(claim.kind), claim.from == OrientationFrom::kLandmarks ? "OE" : "PT", r.pairs,
-        r.freedom, r.rms_px, r.rms_deg, r.claimed_px, r.ratio, r.low, r.high,
-        to_string(claim.verdict));
+        name_of(claim.kind), mode_of(claim.from), r.pairs, r.freedom, r.rms_px, r.rms_deg,
+        r.claimed_px, r.ratio, r.low, r.high, to_string(claim.verdict));
   }
   return out + "</tbody>\n</table></div>\n";
 }
@@ -212,7 +211,7 @@ std::string known_plot(const KnownComparison& known, int axis) {
   }
   plot.dots(points, colour, 5);
   return html_figure(fmt::format("<b>Known directions, {} mode.</b> {}; with one sigma",
-                                 known.from == OrientationFrom::kLandmarks ? "OE" : "PT", name),
+                                 mode_of(known.from), name),
                      plot.svg("known directions"));
 }
 

@@ -10,10 +10,6 @@
 namespace alidade {
 namespace {
 
-const char* mode_of(OrientationFrom from) {
-  return from == OrientationFrom::kLandmarks ? "OE mode" : "PT mode";
-}
-
 double largest_sigmas(const DepartureTest& test) {
   double out = 0;
   for (std::size_t i = 0; i < test.size.size(); ++i) {
@@ -69,6 +65,10 @@ const ClaimComparison* worst_claim(const Verification& verification) {
 }
 
 }  // namespace
+
+const char* mode_of(OrientationFrom from) {
+  return from == OrientationFrom::kLandmarks ? "OE" : "PT";
+}
 
 const char* to_string(Verdict verdict) {
   switch (verdict) {
@@ -193,7 +193,7 @@ std::string size_of(const DepartureTest& test) {
 std::string sentence_of(const ClaimComparison& comparison) {
   const ClaimResult& r = comparison.result;
   const std::string where =
-      fmt::format("{}, {}", name_of(comparison.kind), mode_of(comparison.from));
+      fmt::format("{}, {} mode", name_of(comparison.kind), mode_of(comparison.from));
   if (comparison.verdict == Verdict::kNotJudged) {
     return fmt::format(
         "{}: not judged; {} pairs, worth {:.0f} independent numbers ({} and {:.0f} "
@@ -223,7 +223,7 @@ std::string sentence_of(const ModelComparison& comparison) {
 
 std::string sentence_of(const KnownComparison& comparison) {
   const KnownResult& r = comparison.result;
-  std::string out = fmt::format("known directions, {}: ", mode_of(comparison.from));
+  std::string out = fmt::format("known directions, {} mode: ", mode_of(comparison.from));
   if (r.offsets.empty()) return out + "not judged; none of their frames has an orientation";
   if (!r.is_determined) {
     return out + fmt::format(
@@ -261,7 +261,7 @@ std::string summary_of(const Verification& v) {
           ? ""
           : fmt::format(
                 "directions of the same place differ by {:.2f} times what "
-                "sigma claims (limit {:.2f}; {}, {})",
+                "sigma claims (limit {:.2f}; {}, {} mode)",
                 worst->result.ratio, worst->result.ratio / std::max(1e-9, worst->result.low),
                 name_of(worst->kind), mode_of(worst->from));
   std::vector<std::string> parts;

@@ -16,6 +16,8 @@ namespace alidade {
 // The size of a departure, with its sigma and unit: "off by 3.02 +- 0.05 ms".
 [[nodiscard]] std::string size_of(const DepartureTest& test);
 
+// "OE" or "PT".
+[[nodiscard]] const char* mode_of(OrientationFrom from);
 [[nodiscard]] std::string sentence_of(const ClaimComparison& comparison);
 [[nodiscard]] std::string sentence_of(const ModelComparison& comparison);
 [[nodiscard]] std::string sentence_of(const KnownComparison& comparison);

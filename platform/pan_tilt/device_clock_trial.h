@@ -1,11 +1,13 @@
 #pragma once
 // DeviceClockTrial: decides whether the times in a polled device's answers are useful.
 //
-// Devices report the time of the measurement, the time of the answer, whole seconds, a constant, or
-// nothing. Times are useful if they never go backwards, are finer than whole seconds, and advance
-// at the rate of the host's clock (within kSlack_s). The verdict comes with the second change of
-// the device time, or is kUseless if that change takes too long. A verdict other than kOpen is
-// final. No side effects; one thread.
+// What a device gives as time differs: when it measured, when it answered, the latter in whole
+// seconds, a constant, or nothing. Times are useful if they never go backwards, are finer than
+// whole seconds, and have advanced as the host's clock since the first answer, to kSlack_s. The
+// verdict comes with the second advance of the device time. It is kUseless at once if a time is
+// missing, goes backwards or differs by more than kSlack_s; also if the second advance has not come
+// by the first answer that is the kAnswers-th or later and over kPatience_s after the first. A
+// verdict other than kOpen is final. No side effects; one thread.
 
 #include <cmath>
 #include <optional>

@@ -2,11 +2,12 @@
 // open_http_polling(): a PanTiltSource that polls a device over one persistent HTTP connection
 // (libcurl). An HttpConversation, which does no I/O, makes the requests and interprets the answers.
 // Polls lie on a fixed grid of 1/rate_hz; a late answer skips grid points and does not shift the
-// grid. kDisconnected: unreachable, timed out, or the conversation reports kDisconnected; the next
-// attempt follows after a growing pause. kFailed: unusable URL; before the first sample also a
-// permanent error of the conversation, such as a refused login. After the first sample such an
-// error is kDisconnected, as a rebooting device may refuse for a while (kMostRefusalPauses). read()
-// runs the transfer on the calling thread and allocates.
+// grid. kDisconnected: unreachable, timed out, an answer that is too long, a redirection that
+// LinkRules refuse, or the conversation reports kDisconnected; the next attempt follows after a
+// growing pause. kFailed: unusable URL or rate_hz; before the first sample (or kNothing) also a
+// permanent error of the conversation, such as a refused login. Later such an error is
+// kDisconnected, as a rebooting device may refuse for a while (kMostRefusalPauses). read() runs the
+// transfer on the calling thread and allocates.
 
 #include <memory>
 #include <optional>
@@ -45,12 +46,13 @@ struct HttpAnswer {
 class HttpConversation {
  public:
   enum class Outcome {
-    kSample,        // *sample holds pan, tilt, zoom, device time; the next request is on the grid
+    kSample,        // *sample has zoom, device time, and pan and tilt (rad) as the device counts;
+                    // the next request is on the grid
     kAskOn,         // the next request follows at once
-    kNothing,       // no sample; the next request is on the grid
+    kNothing,       // a good answer, but no sample yet; the next request is on the grid
     kDisconnected,  // *error says why; next_request() starts anew after a pause
-    kRefused,       // *error says why the login is wrong; like kFailed, but later rarely retried
-    kFailed         // *error says why; like kDisconnected once there has been a sample
+    kRefused,       // *error says why the login is wrong; like kFailed, but with longer pauses
+    kFailed         // *error says why; like kDisconnected after a first kSample or kNothing
   };
 
   virtual ~HttpConversation() = default;
@@ -63,7 +65,7 @@ class HttpConversation {
     reset();
     return Outcome::kDisconnected;
   }
-  // A working connection has failed: start anew.
+  // The connection has failed: next_request() starts anew.
   virtual void reset() = 0;
   // How the device is known to deviate from its protocol, for PanTiltSource::take_notes.
   [[nodiscard]] virtual std::vector<std::string> notes() const { return {}; }
@@ -83,7 +85,7 @@ struct HttpDeviceOptions {
   AxisMapping pan;  // applied to the angle parsed from an answer
   AxisMapping tilt;
   double rate_hz = 30;
-  double timeout_s = 1;      // for one request
+  double timeout_s = 1;      // for one request, connection included
   double max_backoff_s = 5;  // longest pause between two attempts
 };
 

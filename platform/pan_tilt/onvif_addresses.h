@@ -14,14 +14,15 @@ enum class OnvifService { kMedia, kPtz };
 
 // URLs to try, best first, without duplicates. All are at the host of `device` (the URL of the
 // device service), as logins are sent there. told: the address that the device reports; may be
-// empty. Order: the reported port and path, if the reported host is the device's and no login is
-// sent (other_port); the reported path at the device's own port, also behind the prefix of a proxy
+// empty. Order: the reported port and path, if other_port is true and the reported scheme and host
+// are the device's; the reported path at the device's own port, also behind the prefix of a proxy
 // (http://proxy/cam1/onvif/device_service); the usual paths; the URL of the device service itself.
+// other_port: to be false if a login is sent.
 [[nodiscard]] std::vector<std::string> onvif_addresses(const Url& device, const std::string& told,
                                                        OnvifService service,
                                                        bool other_port = false);
 
-// device's http://host:port with this path. A path may start with another port: ":8080/path".
+// This path at device's scheme, host and port. A path may start with another port: ":8080/path".
 [[nodiscard]] std::string onvif_address(const Url& device, const std::string& path);
 
 }  // namespace alidade

@@ -18,6 +18,7 @@ namespace alidade {
 
 class OnvifLoginWays {
  public:
+  // kDeviceClock: the UTC that the device reports, or its local time if it reports no UTC.
   enum class Way { kDeviceClock, kHostClock, kLocalClock, kDigest };
   static constexpr int kMostTries = 3;
 
@@ -30,7 +31,8 @@ class OnvifLoginWays {
   // now, s.
   [[nodiscard]] double created_utc_s(double monotonic_s, double utc_s) const;
 
-  // The login was refused. True: try another way at once.
+  // The login was refused. True: try way(), which is another one now, at once. False: nothing is
+  // left to try, or a login was accepted before; the next attempt is by way(), after a pause.
   [[nodiscard]] bool refused(bool offers_digest);
   // The login was accepted.
   void accepted();

@@ -70,20 +70,23 @@ struct OnvifServices {
   std::string ptz;
   std::string media;
 };
-// Parses the answer to GetCapabilities or GetServices. False: the answer names no PTZ service.
+// Parses the answer to GetCapabilities or GetServices. False: it names no PTZ service (`media` may
+// be set), or is no such answer (*services is empty).
 [[nodiscard]] bool parse_onvif_services(std::string_view body, OnvifServices* services,
                                         std::string* error);
 
-// Tokens of the first profile that has a PTZ configuration. configuration and node may be empty.
+// Tokens of the first profile that has a token and a PTZ configuration. configuration and node may
+// be empty.
 struct OnvifProfile {
   std::string token;
   std::string configuration;
   std::string node;
 };
+// On false *profile is undefined.
 [[nodiscard]] bool parse_onvif_profile(std::string_view body, OnvifProfile* profile,
                                        std::string* error);
 
-// Lowest and highest value of an axis, in device units.
+// Lowest and highest value of an axis, in device units. As declared: low may exceed high.
 struct OnvifInterval {
   double low = 0;
   double high = 0;
@@ -91,13 +94,13 @@ struct OnvifInterval {
 
 // The range of absolute pan and tilt that a device declares for a space.
 struct OnvifSpaceRange {
-  std::string space;  // URI
-  std::optional<OnvifInterval> pan;
+  std::string space;                 // URI
+  std::optional<OnvifInterval> pan;  // nullopt: not declared, or incomplete
   std::optional<OnvifInterval> tilt;
 };
 // Parses the answer to GetNodes or GetConfigurationOptions. node: token of the node whose spaces
-// are taken; if it is empty, or the answer lacks the node, all nodes' are. False: no range is
-// declared.
+// are taken; if it is empty, or the answer lacks the node, all nodes' are. False: no space of
+// absolute pan and tilt is declared, or this is no such answer; *ranges is then empty.
 [[nodiscard]] bool parse_onvif_ranges(std::string_view body, const std::string& node,
                                       std::vector<OnvifSpaceRange>* ranges, std::string* error);
 
@@ -105,10 +108,11 @@ struct OnvifSpaceRange {
 struct OnvifStatus {
   double pan = 0;
   double tilt = 0;
-  std::string space;  // URI of pan and tilt; empty: none is named
-  std::optional<double> zoom;
-  std::optional<double> utc_s;  // Unix time
+  std::string space;            // URI of pan and tilt; empty: none is named
+  std::optional<double> zoom;   // device units
+  std::optional<double> utc_s;  // Unix time; nullopt: none, or not an xs:dateTime
 };
+// False: no answer to GetStatus, or one without a position; *status is unchanged.
 [[nodiscard]] bool parse_onvif_status(std::string_view body, OnvifStatus* status,
                                       std::string* error);
 

@@ -4,12 +4,12 @@
 // At each (re)connection the source asks for the device's clock (if a login is configured), its
 // services (GetCapabilities, or GetServices; only at the host of `url`: onvif_addresses.h), a
 // profile with PTZ if none is configured, and the range of its positions (GetNodes, or
-// GetConfigurationOptions) if positions are not in degrees (onvif_scale.h). Login: onvif_login.h.
+// GetConfigurationOptions) if OnvifScale needs it. Login: onvif_login.h.
 // device_time_s: UtcTime as Unix time, if it is useful (device_clock_trial.h). The first answers
 // are withheld until this is decided, so that all samples have a device time or none has.
-// kDisconnected: unreachable, timed out, a SOAP fault, HTTP status other than 200, no position in
-// the answer. kFailed: unusable URL; before the first sample also wrong user or password, or a
-// scale without angles. A later refusal may come from a rebooting device or a changed clock.
+// kDisconnected and kFailed: http_polling_source.h. Here the former is also a SOAP fault, an HTTP
+// status other than 200, no position in the answer, and a position outside its scale. The latter is
+// also, before the first sample, wrong user or password, or a scale without angles.
 
 #include <memory>
 #include <optional>
@@ -20,7 +20,8 @@
 
 namespace alidade {
 
-// url: http://host[:port][/onvif/device_service]. pan and tilt apply to the angle after the range.
+// url: http[s]://host[:port][/onvif/device_service]. AxisMapping (pan, tilt) is applied to the
+// angle that OnvifScale gives.
 struct OnvifSourceOptions : HttpDeviceOptions {
   OnvifSourceOptions() { rate_hz = 10; }  // SOAP is costly for a camera
 

@@ -23,13 +23,13 @@ struct PelcoDOptions {
 
 struct PelcoDAnswer {
   std::uint16_t value = 0;
-  std::size_t begin = 0;
+  std::size_t begin = 0;  // index of its first byte
 };
 
 [[nodiscard]] std::string pelco_d_query(int address, std::uint8_t opcode);
 
-// The latest complete answer with this address and opcode. *problem says what came instead, if
-// anything.
+// The latest complete answer with this address and opcode. nullopt: *problem is one line on what
+// came instead; unchanged if less than a frame came. If an answer is found, *problem is empty.
 [[nodiscard]] std::optional<PelcoDAnswer> find_pelco_d_answer(std::string_view bytes, int address,
                                                               std::uint8_t opcode,
                                                               std::string* problem);

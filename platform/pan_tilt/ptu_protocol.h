@@ -2,10 +2,11 @@
 // FLIR (Directed Perception) PTU: ASCII commands that end with a space, answers of one line.
 //   PP  -> "* Current Pan position is 1000", terse (after FT) "* 1000";  TP for tilt
 //   PR  -> "* 185.1428 seconds arc per position";  TR for tilt;  errors "! text"
-// On connection: FT or FV (terse or verbose), ED (no echo), CI (answers at once), then PR and TR
-// unless the degrees per step are configured, then PP and TP in turn. A verbose answer names its
-// axis, which must be the axis of the query. A terse answer, or one to PR and TR, names no axis.
-// Fences (query_protocol.h): docs/derivations.md. A lost digit is not noticed.
+// On connection: FT or FV (terse or verbose), ED (no echo), CI (answers at once), then PR or TR for
+// each axis whose degrees per step are not configured, until two answers in a row are equal, then
+// PP and TP in turn. A verbose answer names its axis, which must be the axis of the query. A terse
+// answer, or one to PR and TR, names no axis. Fences (query_protocol.h): docs/derivations.md. A
+// lost digit is not noticed.
 
 #include <optional>
 

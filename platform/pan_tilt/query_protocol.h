@@ -4,9 +4,10 @@
 // One query is outstanding at a time; next() returns it. find() looks for the answer in all bytes
 // since the query was sent (at most kMaxAnswer; of more, the oldest are dropped) and takes the
 // latest of several answers. Anything else is skipped: noise, partial frames, echoes, late answers
-// to another query, unsolicited lines. After give_up(), next() returns a fence, a query with a
-// different answer, so that a late answer is not taken for that of a later query. Angles are
-// degrees of the device; QuerySource applies signs and zeros. Fences: docs/derivations.md.
+// to another query, unsolicited lines. After give_up(), next() returns a query with a different
+// answer, so that a late answer is not taken for that of a later query. Unless answers name their
+// query, that is a fence: a query of another kind. Angles are degrees as the device counts;
+// QuerySource applies signs and zeros. Fences: docs/derivations.md.
 
 #include <cstddef>
 #include <cstdint>

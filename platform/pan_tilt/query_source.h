@@ -1,15 +1,16 @@
 #pragma once
-// QuerySource: polls a head for its position, by any QueryProtocol over any ByteLink. Polls lie on
-// a grid of rate_hz, or of a lower rate if the serial line cannot carry rate_hz. One query is
-// outstanding at a time; an answer later than the next grid point shifts the grid. A sample was
-// true at some moment between the sending of the query and the first byte of its answer. Protocols
-// that report one axis at a time give one sample for each reading of tilt, with pan interpolated to
-// the moment of the tilt (AxisPairing).
+// QuerySource: polls a head for its position, by any QueryProtocol over any ByteLink. Readings of
+// pan and tilt lie on a grid of rate_hz, or of the rate that the serial line can carry if that is
+// lower. One query is outstanding at a time; an answer later than the next grid point shifts the
+// grid. A sample was true at some moment between the sending of the query and the first byte of its
+// answer. Protocols that report one axis at a time give one sample for each reading of tilt, with
+// pan interpolated to the moment of the tilt (AxisPairing).
 // Angles are mapped by sign and zero to the model's axes, in [-pi, pi). Late answers:
 // docs/derivations.md.
-// kDisconnected: no link, or no sample within timeout_s and three queries given up; error() says
-// what came instead. The link is then reopened after a growing pause. kFailed: an address or a
-// device that can never work. read() does the I/O on the calling thread; it allocates.
+// kDisconnected: no link, or three queries or more given up since the latest sample, the first of
+// them sent timeout_s ago or earlier; error() says what came instead. The link is then reopened
+// after a growing pause. kFailed: an address or a device that can never work, or options that are
+// not positive. read() does the I/O on the calling thread; it allocates.
 
 #include <atomic>
 #include <memory>
@@ -32,7 +33,8 @@ struct QuerySourceOptions {
   AxisMapping pan;
   AxisMapping tilt;
   double rate_hz = 30;
-  double timeout_s = 1;      // after so long without a sample the head counts as lost
+  double timeout_s = 1;      // until a head without samples counts as lost; a quarter of it for an
+                             // answer (more on a slow line); also for opening the link
   double max_backoff_s = 5;  // longest pause between two attempts
 };
 

@@ -15,8 +15,8 @@ struct VapixPosition {
   std::optional<double> zoom;  // device units
 };
 
-// False: *error is one line. Unknown keys are ignored. pan and tilt are required, each finite and
-// within a turn.
+// Unknown keys are ignored. pan and tilt are required, each within -360..360 degrees. False: *error
+// is one line, *position is unchanged.
 [[nodiscard]] bool parse_vapix_position(std::string_view body, VapixPosition* position,
                                         std::string* error);
 

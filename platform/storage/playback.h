@@ -16,8 +16,9 @@ class Playback {
  public:
   Playback(std::string directory, bool realtime);
 
-  // Waits until an item with this receive time is due, at most timeout_s. Returns kOk, kTimeout or
-  // kStopped. The first call starts the clock.
+  // Waits until an item with this receive time (s, the recording's clock) is due, at most
+  // timeout_s; at full speed not at all. Returns kOk, kTimeout or kStopped. The first call starts
+  // the clock; for that it reads both tables.
   [[nodiscard]] ReadStatus wait_until_due(double receive_time_s, double timeout_s);
 
   // Thread-safe.

@@ -7,10 +7,12 @@
 //   tracks.csv       frame,landmark,u_px,v_px,sigma_px   (in place of, or beside, the video)
 // Times are seconds of one clock (the recording host's), angles are radians. A cell of an optional
 // column may be empty: the value is unknown. Unknown columns are ignored. Every line ends with a
-// newline, so that a file cut off in the middle of a number is not taken for a complete one. Stamps
-// are passed on unchecked: the clock filter handles equal or jumping stamps. On failure the
-// functions return false and *error is one line: what is wrong, file:line, what would be right.
-// parse_...() take the text itself; name stands for the file in errors.
+// newline, so that a file cut off in the middle of a number is not taken for a complete one. An
+// error is a negative `frame` of frames.csv, or an interval of telemetry that begins after its end.
+// Otherwise stamps are unchecked: the clock filter handles equal or jumping ones. On failure the
+// functions return false and *error is one line: what is wrong, file:line, what would be right; a
+// vector then holds the rows before the fault. parse_...() take the text itself; name stands for
+// the file in errors.
 
 #include <cstdint>
 #include <istream>
@@ -23,9 +25,9 @@
 namespace alidade {
 
 struct RecordingInfo {
-  int width = 0;   // px
-  int height = 0;  // px
-  std::string notes;
+  int width = 0;      // px, 1 to kMostPictureSide
+  int height = 0;     // px, likewise
+  std::string notes;  // empty: none
 };
 
 // A landmark as seen in one frame: pixel (u right, v down, centre of the top-left pixel (0.5, 0.5))

@@ -15,15 +15,16 @@ namespace alidade {
 class RecordingWriter {
  public:
   // Creates the directory if needed. width, height: px. False with one line in *error, also for a
-  // directory that already holds a recording's tables.
+  // directory that already holds a file of a recording; files made until then stay.
   [[nodiscard]] bool open(const std::string& directory, int width, int height,
                           const std::string& notes, std::string* error);
 
+  // False: nothing is added, and *error is one line.
   [[nodiscard]] bool add_frame(const FrameStamp& stamp, std::string* error);
   [[nodiscard]] bool add_telemetry(const PanTiltSample& sample, std::string* error);
 
-  // Asks the system to sync the files to the disk, against a power cut. Without a flush() rows
-  // still survive a kill of the process.
+  // Waits until the rows are on the disk (fsync), against a power cut. Without a flush() rows still
+  // survive a kill of the process.
   [[nodiscard]] bool flush(std::string* error);
 
  private:

@@ -19,10 +19,10 @@ struct PanTiltSample {
   double latest_time_s = 0;
   double pan_rad = 0;
   double tilt_rad = 0;
-  std::optional<double> zoom;           // device units
-  std::optional<double> device_time_s;  // device clock
-  std::optional<std::int64_t> sequence;
-  bool restarted = false;  // first sample after a (re)connection
+  std::optional<double> zoom;            // device units
+  std::optional<double> device_time_s;   // s, device clock, any epoch
+  std::optional<std::int64_t> sequence;  // the device's count of samples; a gap is a loss
+  bool restarted = false;                // first sample after a (re)connection
 };
 
 }  // namespace alidade

@@ -1,7 +1,7 @@
 #pragma once
 // ByteLink: bytes to and from a device over a serial line, TCP or UDP, so that a protocol runs over
 // any of them. A link can be closed and reopened any number of times (a plug pulled and put back).
-// No call waits longer than its timeout.
+// No call waits longer than its timeout, nor longer than 10 s.
 //
 // Serial: 8 data bits, no parity, 1 stop bit, raw, no flow control; one program at a time. TCP:
 // without delay of small packets. UDP: to and from one address; each receive() returns one

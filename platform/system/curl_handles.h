@@ -24,9 +24,9 @@ using CurlMultiPtr = std::unique_ptr<CURLM, CurlMultiCleanup>;
 constexpr std::size_t kMostHeaderBytes = 64U << 10U;
 constexpr const char* kHeadersTooLong = "the answer's headers are longer than 64 KB";
 
-// Returns a handle without proxy and signals, or null if libcurl does not start. methods:
-// CURLAUTH_..., used if user is not empty. error_buffer has CURL_ERROR_SIZE bytes and must outlive
-// the handle.
+// Returns a handle for http and https, without proxy and signals, or null if libcurl does not
+// start. methods: CURLAUTH_..., used if user is not empty. error_buffer has CURL_ERROR_SIZE bytes
+// and must outlive the handle.
 [[nodiscard]] CurlEasyPtr make_http_handle(const std::string& user, const std::string& password,
                                            long methods, char* error_buffer);
 [[nodiscard]] CurlMultiPtr make_curl_multi();

@@ -15,7 +15,7 @@ class FileLock {
  public:
   enum class Result {
     kTaken,
-    kInUse,      // by another process
+    kInUse,      // by another process, or by another FileLock of this one
     kImpossible  // no lock is possible: the folder is not writable, or the file system has no locks
   };
 

@@ -1,7 +1,8 @@
 #pragma once
 // FileStamp: detects that a file was changed or replaced, by device, inode, size and times. Two
 // writes within one tick of the file system's clock (some milliseconds) that leave the same size
-// cannot be distinguished.
+// cannot be distinguished. Stamps of files that cannot be found are equal, and equal to a
+// default-constructed one.
 
 #include <sys/stat.h>
 

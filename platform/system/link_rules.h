@@ -12,10 +12,10 @@
 namespace alidade {
 
 struct LinkRules {
-  // kAny: also to other hosts and ports, but without user and password, and never from TLS to
-  // plain.
+  // kSameHost: only to the configured host, port and scheme. kAny: also elsewhere, but without user
+  // and password, and never from TLS to plain.
   enum class Redirects { kSameHost, kAny };
-  // kDigest: never the password itself.
+  // kDigest: never the password itself. kAny: also basic, if the peer offers nothing else.
   enum class Auth { kDigest, kAny };
 
   Redirects redirects = Redirects::kSameHost;

@@ -60,8 +60,8 @@ inline constexpr std::size_t kPrefaultedStack = std::size_t{256} << 10;  // byte
 void return_freed_memory();
 
 // Lets the calling thread run only when no other wants to (SCHED_IDLE, else the highest nice
-// value), whatever scheduling the thread inherited. Returns one line if this was refused; empty:
-// granted.
+// value), on the processors of the process's first thread, whatever scheduling and processor it
+// inherited. Returns one line if the priority was refused; empty: granted.
 [[nodiscard]] std::string set_lowest_priority();
 
 // Returns another thread to the normal policy, so that a thread that is to end does so even on a

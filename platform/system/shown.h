@@ -11,7 +11,7 @@
 
 namespace alidade {
 
-// The first `most` bytes, cut between UTF-8 characters, escaped.
+// The first `most` bytes, cut between UTF-8 characters, then escaped (so it may become longer).
 [[nodiscard]] inline std::string shown(std::string_view text, std::size_t most = 80) {
   const auto is_inside = [&](std::size_t at) {
     return (static_cast<unsigned char>(text[at]) & 0xC0U) == 0x80U;

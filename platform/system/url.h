@@ -19,14 +19,14 @@ struct Url {
   std::string shown;     // bare, without_secrets(); of a text that is no URL: what may be shown
 };
 
-// On false, text is not a URL, *error says so, and url->bare is url->shown.
+// On false, text is not a URL, *error says so, url->bare is url->shown, and the rest is unchanged.
 [[nodiscard]] bool parse_url(const std::string& text, Url* url, std::string* error);
 
 // "***" in place of each value whose key sounds like a secret (password, pwd, token, user ...):
 // srt://h:1?passphrase=***. A value ends at the next of ? & ; / #.
 [[nodiscard]] std::string without_secrets(std::string_view url);
 
-// A foreign address for messages: its first 120 bytes, escaped, without_secrets().
+// A foreign address for messages: without_secrets(), then its first 120 bytes, escaped.
 [[nodiscard]] std::string shown_url(std::string_view url);
 
 // True if the text is a URL over TLS, or the scheme of one: https, rtsps, mqtts.

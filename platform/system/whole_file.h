@@ -20,7 +20,8 @@ namespace alidade {
 [[nodiscard]] bool write_file_atomically(const std::string& path, const std::string& content,
                                          std::string* error);
 
-// The same for a file that was written beside its place by other code.
+// The same last steps for a file that other code wrote beside its place: syncs `from` and renames
+// it to `to`. On false both names are as before, and *error is as above.
 [[nodiscard]] bool move_into_place(const std::string& from, const std::string& to,
                                    std::string* error);
 
@@ -38,7 +39,7 @@ int remove_unfinished(const std::string& folder,
 // For text that people write or read: YAML, passwords, labels.
 inline constexpr std::size_t kMostTextBytes = std::size_t{4} << 20;
 
-// On false *error is `path: cannot be read: why`.
+// On false *error is `path: cannot be read: why`, and *content is unchanged.
 [[nodiscard]] bool read_file(const std::string& path, std::string* content, std::string* error,
                              std::size_t most_bytes = kMostTextBytes);
 

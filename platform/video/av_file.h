@@ -1,6 +1,6 @@
 #pragma once
-// AvFile: the packets of the one video stream of a video file, by libavformat. One thread at a
-// time.
+// AvFile: the packets of one video stream of a video file, by libavformat: of several streams that
+// of av_find_best_stream(). One thread at a time.
 
 #include <string>
 
@@ -15,13 +15,14 @@ class AvFile {
   AvFile(const AvFile&) = delete;
   AvFile& operator=(const AvFile&) = delete;
 
-  // On false, *error is `path: why`.
+  // To be called once. On false, *error is `path: why`; `why` may be that there is no video.
   [[nodiscard]] bool open(const std::string& path, std::string* error);
   [[nodiscard]] bool is_open() const { return stream_ != nullptr; }
   // Valid once the file is open.
   [[nodiscard]] const AVStream& stream() const { return *stream_; }
 
-  // Reads the next packet. False: the end, or the place where a kill cut the file off.
+  // Reads the stream's next packet; the file must be open. False: the end, the place where a kill
+  // cut the file off, or any other error of reading; *packet is then empty.
   [[nodiscard]] bool read(AVPacket* packet);
 
  private:

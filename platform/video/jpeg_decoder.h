@@ -19,7 +19,8 @@ class JpegDecoder {
  public:
   JpegDecoder();
 
-  // Reads only the header. False: not a JPEG, or larger than any camera's picture.
+  // Reads only the header. width, height: px. False: not a JPEG, in printing colours (CMYK), or of
+  // more than kMostFilePixels; see error().
   [[nodiscard]] bool read_size(std::string_view jpeg, int* width, int* height);
 
   // False: see error().

@@ -37,7 +37,7 @@ class LumaDecoder {
   // low_delay: never hold back a picture for reordering, whatever the stream's parameter sets
   // permit, and bound the pictures that the decoder keeps (PictureBudget); H.264 and H.265 data
   // must then be Annex B. A picture of more than max_pixels, counted in whole blocks, cannot be
-  // decoded.
+  // decoded; for JPEG with low_delay the limit is kMostFilePixels instead. False: see error().
   [[nodiscard]] bool open(const AVCodecParameters& parameters, bool low_delay,
                           std::int64_t max_pixels = kMostFilePixels);
 

@@ -35,7 +35,7 @@ class PictureEnds {
 
   struct Loss {
     bool within = false;  // a loss within the picture, or it is unknown whether there was one
-    bool before = false;  // a loss between the picture and the previous one
+    bool before = false;  // a loss between the picture and the previous one, or likewise unknown
   };
 
   // Losses of the picture with this time stamp, after its last piece came out. To be called once

@@ -27,17 +27,17 @@ namespace alidade {
 
 struct AccessUnit {
   PacketPtr packet;                     // one whole picture
-  double receive_time_s = 0;            // CLOCK_MONOTONIC
+  double receive_time_s = 0;            // s, CLOCK_MONOTONIC: arrival of its last packet
   std::optional<double> sender_time_s;  // nullopt: not given, or cannot be true
-  std::optional<double> sender_utc_s;
-  bool begins_anew = false;  // the sender's clock starts anew with this picture
-  bool key = false;          // decoding can start here: key frame or recovery point
-  bool whole = true;         // no loss within it
-  bool follows = true;       // no loss between it and the previous picture
+  std::optional<double> sender_utc_s;   // s, Unix time; nullopt: not known
+  bool begins_anew = false;             // the sender's clock starts anew with this picture
+  bool key = false;                     // decoding can start here: key frame or recovery point
+  bool whole = true;                    // no loss within it
+  bool follows = true;                  // no loss between it and the previous picture
   // px; H.264 and H.265, from the parameter sets; 0: unknown.
   int width = 0;
   int height = 0;
-  bool too_large = false;  // larger than RtpSourceOptions::max_pixels
+  bool too_large = false;  // H.264 and H.265: larger than RtpSourceOptions::max_pixels
   int trial = 0;           // plain RTP: SenderChoice::trial()
 };
 

@@ -35,8 +35,8 @@ struct RtpSourceOptions {
   std::string certificate_file;
   double timeout_s = 3;      // after so long without a whole picture the connection is lost
   double max_backoff_s = 5;  // longest pause between two attempts
-  // A larger picture is not decoded: its frame has its size, but no luma, and it is not copied to a
-  // file.
+  // H.264 and H.265: a larger picture is not decoded: its frame has its size, but no luma. With
+  // copy_to it gives no frame and counts as damaged.
   std::int64_t max_pixels = kMostLivePixels;
   std::string copy_to;  // video.mkv to copy the stream to; empty: none
 };

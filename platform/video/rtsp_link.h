@@ -34,7 +34,8 @@ class RtspLink {
   RtspLink(const RtspLink&) = delete;
   RtspLink& operator=(const RtspLink&) = delete;
 
-  // Name look-up, connection and TLS handshake within the deadline.
+  // Name look-up, connection and TLS handshake, until deadline_s (s, CLOCK_MONOTONIC) at most, as
+  // for all of this class. kOk, kStopped, kTimeout, or kDisconnected or kFailed with *error.
   [[nodiscard]] ReadStatus connect(const std::string& address, double deadline_s,
                                    std::string* error);
   // Numeric address of the camera or of the proxy in front of it; empty: unknown.
@@ -50,7 +51,8 @@ class RtspLink {
   // To be called before PLAY is requested, as packets may follow. first_channel: of RTP; RTCP has
   // the next one.
   void expect_packets(int first_channel);
-  // A message or a packet of the video. kTimeout: none so far.
+  // A message or a packet of the video, valid until the next call. Waits for wait_s at most, and
+  // not longer than 0.1 s. kTimeout: none so far.
   [[nodiscard]] ReadStatus next(double wait_s, RtspFraming::Item* item, std::string* error);
   // The first of the packets that came before PLAY's answer. False: no more.
   [[nodiscard]] bool early_packet(Packet* packet);

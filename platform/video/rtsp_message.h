@@ -30,6 +30,7 @@ class RtspMessage {
   // The message as sent; only for our own messages, which have no body.
   [[nodiscard]] std::string text();
   GstRTSPMsgType type() { return gst_rtsp_message_get_type(&message_); }
+  // Only of a response.
   int status() const { return message_.type_data.response.code; }
   const char* reason() const { return message_.type_data.response.reason; }
   std::string header(GstRTSPHeaderField field) {

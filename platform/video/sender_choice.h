@@ -4,9 +4,10 @@
 //
 //   on trial  one sender (address and SSRC) is followed, at first the one whose packet comes first.
 //             After timeout_s without a decodable picture (doubled at each further trial of the
-//             same sender), if others send, the least tried of the others is next.
-//   kept      once a picture is decoded, for as long as packets come from its address without a
-//             pause of timeout_s. A new SSRC at that address is StreamFilter's matter.
+//             same sender, at most to 64 timeout_s), if others were heard within timeout_s, the
+//             connection ends; the next one tries the least tried of those heard.
+//   kept      once a picture is decoded, for this connection, and for the next one unless its
+//             address was silent for timeout_s before. A new SSRC there is StreamFilter's matter.
 //
 // Packets of others are foreign. Outlives connections. Thread-safe.
 
@@ -42,7 +43,7 @@ class SenderChoice {
 
   // Number of the trial, for keep(). Each begin() counts on.
   [[nodiscard]] int trial() const;
-  // A picture of that trial was decoded.
+  // A picture of that trial was decoded: its sender is kept, if no other trial has begun.
   void keep(int trial);
   // The kept sender's pictures are of no use.
   void give_up();

@@ -19,7 +19,7 @@ struct VideoDescription {
   std::optional<std::uint32_t> source;  // the first SSRC by a=ssrc (RFC 5576)
 };
 
-// nullopt if the text describes no video.
+// nullopt: not an SDP, without a video, or with a port beyond 65535.
 [[nodiscard]] std::optional<VideoDescription> find_video(const std::string& sdp);
 
 }  // namespace alidade

@@ -2,13 +2,13 @@
 // StampGuard: decides which of a stream's time stamps can be true.
 //
 // Pictures are sent in order of capture and never arrive before their capture. So each stamp
-// exceeds the stamp before, and receive - sender falls below its minimum so far by at most
-// kEarly_s, more than a network's delay varies. Exception: a backlog, which arrives at once, with
-// steps of the usual length. Any other stamp is bad, and its picture gets none. When kAgreeing bad
-// stamps in a row follow each other by this rule, the sender's clock was changed, and the last of
-// them is kJumped. But if they lie on the line from before the last good stamp, that good stamp was
-// wrong, and the last of them is kGood. A late picture shows nothing: it may have waited. Fixed
-// memory, no allocation, no exceptions.
+// exceeds the stamp before, and receive - sender falls below its minimum so far by at most kEarly_s
+// (10 s at the second stamp), more than a network's delay varies. Exception: a backlog, which
+// arrives at once, with steps of at most four times the usual length. Any other stamp is bad, and
+// its picture gets none. When kAgreeing bad stamps in a row follow each other by this rule, the
+// sender's clock was changed, and the last of them is kJumped. But if they lie on the line from
+// before the last good stamp, that good stamp was wrong, and the last of them is kGood. A late
+// picture shows nothing: it may have waited. Fixed memory, no allocation, no exceptions.
 
 #include <algorithm>
 #include <cmath>

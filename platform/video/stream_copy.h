@@ -26,13 +26,14 @@ class StreamCopy {
   StreamCopy(const StreamCopy&) = delete;
   StreamCopy& operator=(const StreamCopy&) = delete;
 
-  // Adds a picture; the first call creates the file. A connection with another codec or picture
-  // size than the first cannot be continued. On false, *error is one line.
+  // Adds a picture; the first call creates the file `path`. width, height: px; receive_time_s: s. A
+  // picture with another codec, size or parameter set than the first cannot be added. On false,
+  // *error is one line.
   [[nodiscard]] bool add(const std::string& path, const AVCodecParameters& parameters, int width,
                          int height, const AVPacket& picture, double receive_time_s,
                          std::string* error);
-  // True if the last picture was not added because of another codec or size; the file can still go
-  // on.
+  // True if the last picture was not added because of another codec, size or parameter set; the
+  // file can still go on.
   [[nodiscard]] bool is_another_stream() const { return another_; }
 
  private:

@@ -1,16 +1,17 @@
 #pragma once
 // StreamFilter: selects the RTP and RTCP packets that belong to the agreed stream.
 //
-//   payload type  the description's. Packets of another (metadata, audio, repair) are foreign,
-//                 whatever their time.
-//   source        the SSRC in the camera's answers if its packets come, else that of the first
-//                 packet. Packets of another source are held back. If the current source goes on,
-//                 the held packets were foreign. If the current source is silent while the other
-//                 starts kPictures pictures, or for kSilent_s, the other is the restarted sender,
-//                 and the held packets are its start. If a source left in this way returns, it is
-//                 followed for good: there are two senders.
-//   reports       of a foreign source are foreign.
-// Memory: kMostHeld bytes. One thread at a time.
+//   payload type  the description's. Packets of another type (metadata, audio, repair) are foreign.
+//   source        the SSRC in the camera's answers as soon as its packets come, else that of the
+//                 first packet. Packets of another source are held back. If the followed source
+//                 sends again, the held packets were foreign. If it is silent for twice the usual
+//                 time between pictures, and also for kSilent_s or while the other starts kPictures
+//                 pictures, the other is the restarted sender, and the held packets are its start.
+//                 If the source left in this way returns, it is followed again. If the other was
+//                 heard within kSilent_s, there are two senders: then only kSilent_s counts.
+//   reports       RTCP sender reports of the source held back are held back, those of the last
+//                 foreign source are foreign. All other RTCP is taken.
+// Memory: kMostHeld bytes of packets. One thread at a time.
 
 #include <array>
 #include <cstddef>
@@ -28,28 +29,29 @@ class StreamFilter {
  public:
   static constexpr double kSilent_s = 1;
   static constexpr int kPictures = 3;
-  static constexpr std::size_t kMostHeld = 4 << 20;  // bytes; beyond that the oldest are left out
+  static constexpr std::size_t kMostHeld = 4 << 20;  // bytes; beyond that the oldest are foreign
 
   struct Held {
     std::vector<std::uint8_t> bytes;
-    double arrival_s = 0;
+    double arrival_s = 0;  // s, CLOCK_MONOTONIC
   };
 
-  // payload_type < 0: any. source: from the camera's answers.
+  // payload_type < 0: any. source: the SSRC in the camera's answers; nullopt: not given.
   explicit StreamFilter(int payload_type = -1, std::optional<std::uint32_t> source = std::nullopt)
       : payload_type_(payload_type), agreed_(source) {}
 
-  // To be called for each packet, RTP or RTCP, in order of arrival. True if the packet belongs to
-  // the stream or is neither RTP nor RTCP. After false, the packets of release() come first.
-  // arrival_s: s, CLOCK_MONOTONIC.
+  // To be called for each packet, RTP or RTCP, in order of arrival. True: it is to be used, as one
+  // of the stream, or neither RTP nor a sender report. False: it is foreign or held back; before
+  // the next packet, those of release() are to be used. arrival_s: s, CLOCK_MONOTONIC.
   [[nodiscard]] bool takes(const std::uint8_t* data, std::size_t size, double arrival_s);
 
-  // The next held packet that belongs to the stream after all, in order of arrival.
+  // The next held packet that belongs to the stream after all, in order of arrival. nullopt: none.
   [[nodiscard]] std::optional<Held> release();
 
-  // Calls use(header), in order of arrival, for foreign packets of the stream's source that came
-  // since the last own packet but one and have sequence numbers between the last two. They were not
-  // lost.
+  // After takes() or release() gave an RTP packet of the stream: calls use(header), in order of
+  // arrival, for the foreign packets of the same source that came between it and the stream's
+  // packet before, and whose sequence numbers lie between those of the two. So these numbers were
+  // not lost. At most 32.
   template <class Use>
   void for_each_between(Use use) const {
     const int span = behind(last_sequence_);
@@ -59,7 +61,9 @@ class StreamFilter {
     }
   }
 
+  // SSRC of the source followed; nullopt: no packet of the stream has come.
   [[nodiscard]] std::optional<std::uint32_t> source() const { return source_; }
+  // Number of foreign packets; those still held back are not counted.
   [[nodiscard]] std::int64_t foreign() const { return foreign_; }
   // A description of the last foreign packets; empty: none came.
   [[nodiscard]] const std::string& foreign_kind() const { return kind_; }

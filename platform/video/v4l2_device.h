@@ -5,7 +5,7 @@
 // any thread. At close() ordinary memory with the same content replaces each buffer still held, at
 // the same address. The driver's memory would keep the device open and, once it is unplugged, its
 // number in /dev/video* taken.
-// One thread opens, dequeues and closes; owners may end on any.
+// One thread opens, dequeues and closes; owners may end on any. To be made by std::make_shared().
 
 #include <sys/types.h>
 
@@ -38,10 +38,10 @@ class V4l2Device : public std::enable_shared_from_this<V4l2Device> {
   struct Buffer {
     std::uint32_t index = 0;
     const std::uint8_t* data = nullptr;
-    std::size_t bytes = 0;
-    std::uint32_t sequence = 0;
-    std::uint32_t flags = 0;  // V4L2_BUF_FLAG_...
-    double stamp_s = 0;
+    std::size_t bytes = 0;       // used by the picture
+    std::uint32_t sequence = 0;  // the driver's count
+    std::uint32_t flags = 0;     // V4L2_BUF_FLAG_...
+    double stamp_s = 0;          // s, on the clock that flags name
   };
 
   V4l2Device() = default;
@@ -49,7 +49,7 @@ class V4l2Device : public std::enable_shared_from_this<V4l2Device> {
   V4l2Device(const V4l2Device&) = delete;
   V4l2Device& operator=(const V4l2Device&) = delete;
 
-  // Opens, negotiates and starts streaming.
+  // Opens, negotiates and starts streaming. Unless kOk, the device is closed again.
   [[nodiscard]] Result open(const std::string& path, const V4l2Wish& wish);
   void close();
 
@@ -63,9 +63,9 @@ class V4l2Device : public std::enable_shared_from_this<V4l2Device> {
 
   // The negotiated format.
   [[nodiscard]] V4l2Format format() const { return format_; }
-  [[nodiscard]] int width() const { return width_; }    // px
-  [[nodiscard]] int height() const { return height_; }  // px
-  [[nodiscard]] std::size_t stride() const { return stride_; }
+  [[nodiscard]] int width() const { return width_; }            // px
+  [[nodiscard]] int height() const { return height_; }          // px
+  [[nodiscard]] std::size_t stride() const { return stride_; }  // bytes; of raw formats
 
   // One line without the device's name; valid after kLost, kDenied and kUnusable.
   [[nodiscard]] const std::string& error() const { return error_; }

@@ -25,7 +25,7 @@ namespace alidade {
 class V4l2Stamps {
  public:
   struct Stamp {
-    double receive_time_s = 0;
+    double receive_time_s = 0;                   // s, CLOCK_MONOTONIC
     StampedAt stamped_at = StampedAt::kArrival;  // what receive_time_s refers to
     std::optional<std::int64_t> sequence;
     std::int64_t lost = 0;   // buffers missing before this one

@@ -38,8 +38,8 @@ inline bool is_one_line(std::string_view text) {
   });
 }
 
-// Bytes of an error that shows so much foreign text (platform/system/shown.h), each byte of it as an
-// escape of four at worst, beside words of its own.
+// Bytes of an error that shows so much foreign text (platform/system/shown.h), each byte of it as
+// an escape of four at worst, beside words of its own.
 constexpr std::size_t longest_error(std::size_t words, std::size_t foreign = 80) {
   return words + 4 * foreign;
 }

@@ -88,7 +88,7 @@ class ZoomCurve {
 
   // The calibration after a movement to this reading (device units), with its zoom set. False for
   // an empty curve, and for a reading that is not finite or farther beyond an end than the two ends
-  // are apart.
+  // are apart; *calibration is then unchanged.
   [[nodiscard]] bool at(double reading, Calibration* calibration) const {
     if (empty() || !std::isfinite(reading)) return false;
     const double x = position(reading);

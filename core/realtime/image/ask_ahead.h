@@ -14,7 +14,8 @@ inline void ask_ahead(const void* address) {
   __builtin_prefetch(address, kRead, kOfUseForLong);
 }
 
-// All cache lines from begin up to end.
+// One request every kCacheLine bytes, from begin up to end. If begin is not the first byte of a
+// line, the last line may not be requested.
 inline void ask_ahead(const void* begin, const void* end) {
   for (const auto* at = static_cast<const char*>(begin); at < end; at += kCacheLine) ask_ahead(at);
 }

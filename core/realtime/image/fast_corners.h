@@ -17,9 +17,9 @@
 namespace alidade {
 
 struct FastCorner {
-  std::uint16_t u;  // pixel column
-  std::uint16_t v;  // pixel row
-  std::uint8_t score;
+  std::uint16_t u;     // pixel column
+  std::uint16_t v;     // pixel row
+  std::uint8_t score;  // grey levels
 };
 
 enum class FastStatus {
@@ -38,12 +38,14 @@ struct FastResult {
 
 class FastGrid {
  public:
-  // cell_size: px, at least 8. Sizes up to 65535.
+  // max_width, max_height: px, 22 x 7 to 65535 x 65535. cell_size: px, 8 to 65535. Other values are
+  // clamped.
   FastGrid(int max_width, int max_height, int cell_size);
   FastGrid(const FastGrid&) = delete;
   FastGrid& operator=(const FastGrid&) = delete;
 
-  // Corners in reading order of their cells. Room for max_cells() always suffices.
+  // threshold: grey levels. capacity: of `corners`; max_cells() always suffices. Corners come in
+  // reading order of their cells.
   // A cell keeps its best corner, of equal ones the first in reading order. The corner is returned
   // only if it is also the best of its 3x3 pixels, some of which may belong to another cell. So all
   // corners are among those of FAST with non-maximum suppression. The best score so far is the

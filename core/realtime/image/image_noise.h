@@ -10,7 +10,7 @@
 
 namespace alidade {
 
-// scratch: room for `capacity` samples, at least 1.
+// image: valid. scratch: room for `capacity` samples, at least 1.
 [[nodiscard]] double image_noise(const ImageView& image, float* scratch, int capacity);
 
 struct RunningNoiseOptions {

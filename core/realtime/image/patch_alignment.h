@@ -18,7 +18,8 @@ namespace alidade {
 
 inline constexpr int kPatchSize = 8;                  // points in each direction
 inline constexpr double kUnobservedVariance = 100.0;  // px^2
-// tr(MR)^2 / tr(MRMR), M the projection on the residuals: 29 to 31 for any texture of 8x8 points.
+// tr(MR)^2 / tr(MRMR), M the projection on the residuals, R the correlation of the points' noise
+// (they are blurred): 29 to 31 for any texture of 8x8 points.
 inline constexpr double kNoiseFreedom = 30;
 
 struct ReferencePatch {
@@ -29,7 +30,7 @@ struct ReferencePatch {
   Vector2<float> value_gradient;   // sums of value times gradient
   float mean = 0;                  // grey levels
   float residual_trace = 0;        // sum of squared residuals for noise of 1 grey level
-  Matrix2<float> unit_covariance;  // H^-1 G' R G H^-1
+  Matrix2<float> unit_covariance;  // px^2 for noise of 1 grey level; H^-1 G' R G H^-1
   Matrix2<float> unobserved;       // projection on directions without contrast
   // px; sums of to_u (to_v) times gradient (row) times point (column).
   Matrix2<float> warp_moments_u, warp_moments_v;
@@ -40,7 +41,7 @@ enum class PrepareStatus {
   kOk,
   kEdge,        // contrast in one direction only
   kTooFlat,     // no contrast
-  kOutOfImage,  // needs pixels outside the reference image
+  kOutOfImage,  // no reference image, or the patch needs pixels outside it
   kNotFinite    // A is not finite
 };
 
@@ -64,7 +65,7 @@ enum class PrepareStatus {
 }
 
 struct AlignmentLimits {
-  int max_iterations = 12;
+  int max_iterations = 12;       // >= 1
   double converged_step = 2e-3;  // px
   double max_move = 4;           // px from the start
   double min_gain = 0.2;         // of contrast
@@ -74,7 +75,7 @@ struct AlignmentLimits {
 
 enum class AlignmentStatus {
   kConverged,
-  kOutOfImage,    // started or moved out of the image
+  kOutOfImage,    // no image, or the patch started or moved out of it
   kMovedTooFar,   // more than max_move
   kNotConverged,  // still moving after max_iterations
   kUnlike,        // gain or correlation outside the limits
@@ -91,7 +92,8 @@ struct Alignment {
   int iterations = 0;
 };
 
-// *out is written on kConverged. For statistics also on kUnlike and kNotConverged.
+// start: px. *out is written on kConverged. For statistics also on kUnlike and kNotConverged; if
+// the gain is outside its limits, only position, gain and iterations mean something.
 [[nodiscard]] AlignmentStatus align(const ReferencePatch& reference, const ImageView& image,
                                     const Vector2<double>& start, const AlignmentLimits& limits,
                                     Alignment* out);
@@ -107,8 +109,8 @@ struct PatchStep {
   double correlation;    // -1 to 1, at the present position
 };
 
-// False if the patch would leave the image, `at` is not finite, or the image has a single grey
-// level there.
+// False if there is no image, if the patch would leave it, if `at` (px) is not finite, or if the
+// image has no contrast there besides an even slope; *out is then unchanged.
 [[nodiscard]] bool measure_step(const ReferencePatch& reference, const ImageView& image,
                                 const Vector2<double>& at, PatchStep* out);
 

@@ -61,7 +61,8 @@ enum class SampleStatus {
   kOutsideMargin  // a tap is outside the image, or the point is not finite
 };
 
-// For a point, or for the first of columns x rows points 1 px apart.
+// For a point (u, v), px, or for the first of columns x rows points 1 px apart: the status is that
+// of all. *out is written on kOk.
 template <int kTaps>
 [[nodiscard]] inline SampleStatus find_taps(const ImageView& image, double u, double v, int columns,
                                             int rows, TapPlace* out) {
@@ -80,7 +81,7 @@ template <int kTaps>
   return SampleStatus::kOk;
 }
 
-// *value and, if wanted, *gradient (d/du, d/dv; 1/px) are written on kOk.
+// *value (grey levels) and, if wanted, *gradient (d/du, d/dv; grey levels / px) are written on kOk.
 template <class Kernel>
 [[nodiscard]] inline SampleStatus sample(const ImageView& image, double u, double v, float* value,
                                          Vector2<float>* gradient = nullptr) {

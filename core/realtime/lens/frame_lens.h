@@ -13,11 +13,11 @@ struct FrameLens {
   Calibration calibration;
   double rate = 0;        // 1/s, d log f / dt
   double rate_sigma = 0;  // 1/s
-  // False: as far as readings show, the lens has not moved since the previous frame.
+  // False: as far as the readings around the frame's time show, the lens is at rest.
   bool moves = false;
   // Slopes along the curve: change of the distortion in the corner (1) and of the optical centre
-  // (px) per unit of log f. With them distortion and centre follow from the reading's log f to the
-  // frame's, as a coarse reading is off.
+  // (px) per unit of log f. They carry distortion and centre from the reading's log f to the
+  // frame's, as a coarse reading may be off.
   CornerDistortion<double> corner_by_zoom = CornerDistortion<double>::Zero();
   Vector2<double> centre_by_zoom = Vector2<double>::Zero();
 };

@@ -1,8 +1,7 @@
 #pragma once
-// LensFollower: the lens of each frame once the lens has left the map's. It gives the camera that
-// is expected before landmarks are found, the lens that they show, and the calibration of the
-// answer. follow() begins the following, begin() or give_up() ends it. For each frame, in this
-// order:
+// LensFollower: the lens of each frame once it differs from the map's. It gives the camera that is
+// expected before landmarks are found, the lens that they show, and the calibration of the answer.
+// follow() begins the following, begin() or give_up() ends it. For each frame, in this order:
 //   begin_frame()        takes the zoom reading, if there is one
 //   expect_after_last(), expect_by_reading()   expect a camera; the last call counts
 //   look_through()       sets the camera to find landmarks with
@@ -47,7 +46,7 @@ class LensFollower {
   explicit LensFollower(const LensFollowerOptions& options)
       : options_(options), track_(options.track), judge_(options.belief) {}
 
-  // The lens is the map's. focal_length: px.
+  // The lens is the map's. focal_length: px, of the map's calibration.
   void begin(double focal_length);
   // reading: null if there is none.
   void begin_frame(const FrameLens* reading);
@@ -84,7 +83,8 @@ class LensFollower {
   [[nodiscard]] const LensTrack::State& expected() const { return expected_; }
   // Restores this state after searches that found nothing.
   void expect(const LensTrack::State& state) { expected_ = state; }
-  // True if the reading is believed and its log f is better known than from the previous frames.
+  // True if the reading is believed and its log f is at least as well known as expected(). To be
+  // called after expect_after_last().
   [[nodiscard]] bool reading_tells_more(double time_s) const;
   // True if a reading or recent landmarks show the lens.
   [[nodiscard]] bool is_known(double time_s) const {
@@ -108,7 +108,8 @@ class LensFollower {
   [[nodiscard]] OwnLens learn(double time_s, const SolvedZoom& zoom, double focal_length,
                               double zoom_rate, const LensScale& scale);
   void note_lost() { frames_lost_ += columns_ ? 1 : 0; }
-  // True if neither the curve nor the previous frames lead to the lens.
+  // True after frames_lost_for_good lost frames in a row, if there is a reading and it rests: then
+  // neither the curve nor the previous frames lead to the lens.
   [[nodiscard]] bool is_lost_for_good() const {
     return columns_ && frames_lost_ >= options_.frames_lost_for_good && reading_ &&
            !reading_->moves;
@@ -121,7 +122,7 @@ class LensFollower {
 
   // Variances of distortion and centre beyond what is shared with the map's lens: the curve's at
   // this zoom or at a zoom where landmarks held, whichever is larger. Each zoom has errors of its
-  // own. In the map's columns.
+  // own. In the map's columns. 0 without a reading, or if the lens is the map's.
   [[nodiscard]] ParameterDirection unshared(const LensScale& scale) const;
 
   // phi was moved into the map: log f grows by it, and phi counts from 0.

@@ -22,7 +22,8 @@ class ReadLens {
   void begin_frame(double time_s) { time_s_ = time_s; }
   [[nodiscard]] double time_s() const { return time_s_; }
 
-  // readout_s: s, from the first row to the last. False: the curve has no lens for the readings.
+  // readout_s: s, from the first row to the last. False: there are no readings, or the curve does
+  // not reach them; *lens is then not to be used, here and below.
   [[nodiscard]] bool look_up(const ZoomCurve& curve, const ZoomReadings& readings, double readout_s,
                              FrameLens* lens);
   // The curve's lens at the focal length that landmarks showed lately, carried on at its rate.

@@ -43,8 +43,8 @@ class ReadingJudge {
 
   // No landmarks have been compared with a reading.
   void forget() { excluded_ = false; }
-  // Landmarks held. difference: of log f, theirs minus the reading's; sigma: of both; or both in
-  // any other unit.
+  // Landmarks held. difference: of log f, theirs minus the reading's. sigma: of the difference.
+  // Both may be in any common unit.
   void judge(double difference, double sigma) { excluded_ = std::abs(difference) > reach(sigma); }
 
   // age_s: since landmarks last showed the lens. True if that lens still counts.
@@ -61,7 +61,7 @@ class ReadingJudge {
         options_.fastest * std::abs(age_s) + reach(std::min(sigma, options_.largest_sigma));
     return std::abs(change) > most ? ReadingBelief::kJumped : ReadingBelief::kBelieved;
   }
-  // Largest difference from a reading of this sigma at which it is believed.
+  // Largest difference of log f at which a reading is believed. sigma: of the difference.
   [[nodiscard]] double reach(double sigma) const { return options_.excluded_sigmas * sigma; }
 
  private:

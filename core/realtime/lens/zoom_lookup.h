@@ -19,16 +19,17 @@ class ZoomLookup {
   void add(double time_s, double zoom);
 
   // Whether the lens stood at this zoom at that time: both readings around the time are within the
-  // tolerance.
+  // tolerance (device units). False without readings.
   [[nodiscard]] bool stands_at(double zoom, double tolerance, double time_s) const;
 
-  // The relative change of focal length, by the curve, between the readings around the time and the
-  // reading after them. Shows a lens that begins to move, as its first readings are still within
-  // the tolerance. 0: no change, or the curve does not reach the readings.
+  // Span of log f, by the curve, over the two readings around the time and the reading after them;
+  // >= 0. Shows a lens that begins to move, as its first readings are still within the tolerance.
+  // 0: no change, no reading, or the curve does not reach the readings.
   [[nodiscard]] double change_about(const ZoomCurve& curve, double time_s) const;
 
   // The calibration for PT mode, for a frame with this telemetry time of its middle row, whose rows
-  // are read out in readout_s. False: there is no reading, or the curve does not reach it.
+  // are read out in readout_s. False: there is no reading, or the curve does not reach it; the
+  // output is then not to be used, here and below.
   [[nodiscard]] bool calibration(const ZoomCurve& curve, double time_s, double readout_s,
                                  Calibration* calibration) const;
   // The lens for OE mode, likewise. tolerance: device units; readings that are no further apart are
@@ -70,8 +71,9 @@ inline constexpr double kSharpFocalLength = 0.01;
 inline constexpr double kRoughFocalLength = 0.05;
 // log f; so far a lens may lie beyond the ends of the curve.
 inline constexpr double kBeyondEnds = 0.02;
-// The curve's lens with this focal length, px, for a lens whose reading is wrong. `moves` is set.
-// Just beyond an end: the lens at that end. False: the curve does not reach it.
+// The curve's lens with this focal length, px, for a lens whose reading is wrong. `moves` is set,
+// the rate is 0 with a large sigma. Up to kBeyondEnds beyond an end: the lens at that end. False:
+// the curve is empty, does not reach it, or is not monotone; *lens is then not to be used.
 [[nodiscard]] bool lens_of_focal_length(const ZoomCurve& curve, double focal_length,
                                         FrameLens* lens);
 

@@ -15,9 +15,10 @@ class ZoomReadings {
   // tolerance: readings no further apart are one zoom. None: found from their jitter.
   explicit ZoomReadings(std::optional<double> tolerance) : steady_(tolerance) {}
 
-  // time_s: s, when it was received. reading: finite. True if the zoom is another one than before.
+  // time_s: s, when it was received. reading: finite. True if zoom() differs from before, by
+  // however little.
   bool take(double time_s, double reading);
-  // Tells the telemetry time (s) of the reading taken last.
+  // Gives the telemetry time (s) of the reading taken last, for the look-ups below.
   void place(double time_s) {
     if (zoom_) lookup_.add(time_s, *zoom_);
   }
@@ -27,7 +28,8 @@ class ZoomReadings {
   // To be called when a calibration is adopted: if it has no zoom, it counts as made at the present
   // zoom.
   void note_adoption() { zoom_at_adoption_ = zoom_; }
-  // True if the present zoom is the calibration's, or one of the two is unknown.
+  // True if the present zoom is the calibration's, to the tolerance, or one of the two is unknown.
+  // calibrated: the calibration's zoom; empty: that of note_adoption().
   [[nodiscard]] bool fits(const std::optional<double>& calibrated) const;
 
   // See ZoomLookup.

@@ -6,8 +6,8 @@
 //   z = s - o                                o: map_offset_filter.h's offset, not changed here
 // If landmarks answered the measured frame, the measurement gives s; if telemetry answered it, the
 // measurement gives z. If the map begins anew, z remains. Before the first measurement z is exactly
-// 0: the base is telemetry's. Of two measurements, the one with the smaller covariance in the
-// present view is kept.
+// 0: the base is telemetry's. A new measurement is taken only if the trace of its covariance is not
+// larger than that of what is known, in the measured view.
 // Fixed memory; no allocation. One thread. Derivation: docs/derivations.md.
 
 #include "core/model/calibration.h"
@@ -43,7 +43,8 @@ struct SharedByView {
   Vector2<double> extent = Vector2<double>::Zero();  // rad, >= 0; width and height as (pan, tilt)
 };
 
-// rad^2; variance of the difference of the common errors in two views.
+// rad^2; covariance of the difference of the common errors in two views: the smaller, the more the
+// views overlap.
 [[nodiscard]] Matrix2<double> difference_of_shared(const SharedByView& k, const SharedByView& t);
 
 class BaseTie {
@@ -63,6 +64,7 @@ class BaseTie {
   // z; 0 before the first measurement.
   [[nodiscard]] TiedOffset of_telemetry(const MapOffset& offset) const;
 
+  // elapsed_s (s) has passed, and map or telemetry may have drifted in the base.
   void drift(double elapsed_s);
 
   // To be called for each answered frame. added: the value added to telemetry's or the map's angle.
@@ -76,8 +78,9 @@ class BaseTie {
   // Remembers the answer of the frame last noted, as its measurement comes later. Replaces an
   // earlier question. False if the frame has no answer.
   bool ask();
-  // The measurement of the frame that was asked about. False if none was asked about, or if what is
-  // known is better.
+  // The measurement of the frame that was asked about; answers the question. offset: the present
+  // one. False, and the tie stays, if none was asked about, if the measurement is not finite or its
+  // covariance is invalid, or if what is known is better and measurement.moved is false.
   bool settle(const BaseMeasurement& measurement, const MapOffset& offset);
 
   // All landmarks' angles decreased by this.

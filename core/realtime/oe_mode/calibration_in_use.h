@@ -26,8 +26,8 @@ class CalibrationInUse {
   explicit CalibrationInUse(const LensFollowerOptions& options) : lens_(options) {}
 
   void reset(const Calibration& calibration, FocalLength focal_length);
-  // For a map that begins anew. True if the lens has moved: the given calibration is then the
-  // reading's.
+  // For a map that begins anew. True if the lens has moved and there is a reading: the given
+  // calibration is then the reading's.
   bool begin_map();
   // The given calibration is a reading's: the lens moved before there was a map.
   void note_begun_elsewhere() { begun_elsewhere_ = true; }

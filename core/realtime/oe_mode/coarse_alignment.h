@@ -25,7 +25,9 @@ struct CoarsePatch {
 };
 
 struct CoarseOptions {
-  double search_px = 0;  // px of the image; radius of the first search
+  // px of the image; radius of the first search, but at most 10 px of the octave that is searched,
+  // the coarsest one with enough patches. 0: no search.
+  double search_px = 0;
   int max_iterations = 5;
   double min_correlation = 0.6;  // of a patch that counts as found
   double min_found = 0.4;        // required share of found patches at the finest octave
@@ -38,8 +40,8 @@ struct CoarseAlignment {
   int patches = 0;                                  // in the image, at the finest octave
 };
 
-// patches: in descending order of octave. False if too few were found; *out then has the numbers,
-// but its angle must not be used.
+// patches: in descending order of octave. False if no octave could be aligned, or too few patches
+// were found; *out then has the numbers, but its angle must not be used.
 [[nodiscard]] bool align_coarsely(const Pyramid& pyramid, const CoarsePatch* patches, int count,
                                   const CoarseOptions& options, CoarseAlignment* out);
 

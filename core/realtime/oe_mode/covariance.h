@@ -15,7 +15,8 @@ namespace alidade {
 // standard deviations). The solution and the filter of the map's offset use the same.
 inline constexpr double kMaxContradiction = 36;
 
-// The same where they do not exclude each other: chance is beyond it in one frame of a thousand.
+// Chi-square (2 degrees of freedom) of their difference that chance exceeds in one frame of a
+// thousand. Between the two limits they contradict each other, and the answer covers both.
 inline constexpr double kUsualContradiction = 13.8;
 
 // s; correlation time of the common error of the landmarks in view. The filter of the map's offset

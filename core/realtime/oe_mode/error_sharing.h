@@ -1,13 +1,13 @@
 #pragma once
 // ErrorSharing: how much of their errors landmarks have in common with their neighbours in the
-// picture, and frames with the next ones, as in haze or pictures of a low bit rate.
-//   sharing    = mean square of averages over sixths of the picture / that of single residuals
+// image, and frames with the next ones, as in haze or pictures of a low bit rate.
+//   sharing    = mean square of averages over sixths of the image / that of single residuals
 //   repetition = 1 + 2 sum of the correlations of these averages, 1 to kLags frames apart
 //   factor     = 1 + (sharing - 1) repetition
 // Squares are in units of what independent errors with the claimed covariances leave. What a sixth
-// of the picture shares, the frame's angle, rate and acceleration share, too, and what the map
-// takes over from several frames. Learnt over some seconds of frames; 1 where errors are
-// independent. No allocation. One thread.
+// of the image shares, the frame's angle, rate and acceleration share, too, and what the map takes
+// over from several frames. Learnt over some seconds of frames; 1 if errors are independent. No
+// allocation. One thread.
 
 #include <array>
 #include <cstddef>
@@ -19,7 +19,8 @@ namespace alidade {
 class ErrorSharing {
  public:
   void reset() { *this = {}; }
-  // A frame that landmarks answered.
+  // A frame that landmarks answered: SolvedMotion's squares and averages. Ignored without degrees
+  // of freedom.
   void note(const ResidualSquares& single, const ResidualSquares& large,
             const LargeAverages& averages);
   [[nodiscard]] double factor() const;  // >= 1, for the covariance of a frame

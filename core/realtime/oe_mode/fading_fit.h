@@ -13,7 +13,7 @@ struct FadingFit {
   Matrix<double, kUnknowns, kUnknowns> normal = Matrix<double, kUnknowns, kUnknowns>::Zero();
   Row gradient = Row::Zero();
   double square = 0;  // of all y, in their standard deviations
-  double weight = 0;  // count of measurements
+  double weight = 0;  // count of measurements; earlier ones count less
 
   // keep: factor for the weight of all earlier ones, 0 to 1. information: 1 / variance of y.
   void add(double keep, const Row& row, double y, double information) {

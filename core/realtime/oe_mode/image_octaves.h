@@ -29,7 +29,7 @@ class ImageOctaves {
     octaves_.set_noise(noise_.sigma());
   }
 
-  // False if there is no image, or not of the camera's size.
+  // False if there is no image, if it is not of the camera's size, or if it exceeds the options'.
   [[nodiscard]] bool build(const ImageView& image, const Camera<double>& camera) {
     return image.valid() && image.width == camera.width && image.height == camera.height &&
            pyramid_.build(image, octaves_.count()) == PyramidStatus::kOk;

@@ -51,7 +51,8 @@ class LandmarkMaker {
               const ProcessedFrame& frame, const std::vector<VisibleLandmark>& visible,
               LandmarkMap* map, const LensColumns* lens = nullptr);
 
-  // True if the image has enough texture to show landmarks.
+  // True if the image has enough texture to show landmarks. False if the pyramid has no coarse
+  // octave.
   [[nodiscard]] bool is_textured(const Pyramid& pyramid, const Octaves& octaves);
 
   // rad, for LandmarkMap::clear().

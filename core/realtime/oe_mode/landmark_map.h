@@ -20,7 +20,7 @@ namespace alidade {
 
 enum class InsertStatus {
   kOk,
-  kCellTaken,  // by a landmark of this octave
+  kCellTaken,  // by a landmark of this octave and zoom
   kFull,       // and none is worth less than a new one
   kBad         // direction is not a finite unit vector, or octave out of range
 };
@@ -32,8 +32,8 @@ class LandmarkMap {
   static constexpr int kZoomsPerOctave = 4;
   static constexpr int kMaxZoom = 8 * kZoomsPerOctave;
 
-  // capacity: >= 1. cell_size: rad, of octave 0, clamped to [1e-6, 0.5]. A landmark takes about 600
-  // bytes.
+  // capacity: >= 1. cell_size: rad, of octave 0, clamped to [1e-6, 0.5]. largest_cell_size: rad, of
+  // coarser octaves; less than cell_size counts as cell_size. A landmark takes about 600 bytes.
   LandmarkMap(int capacity, double cell_size, double largest_cell_size = kMaxCellSize);
   LandmarkMap(const LandmarkMap&) = delete;
   LandmarkMap& operator=(const LandmarkMap&) = delete;
@@ -60,15 +60,17 @@ class LandmarkMap {
                                     int zoom = 0);
   void retire(int slot);  // occupied(slot)
 
-  // Sets a better direction, a few pixels from the old one. The cell remains that of the first
-  // direction. Ignored unless d is a finite unit vector.
+  // Sets a better direction, a few pixels from the old one, and its own covariance (rad^2). The
+  // cell remains that of the first direction. Ignored unless the slot is occupied and d is a finite
+  // unit vector.
   void refine(int slot, const Vector3<double>& d, const Matrix2<double>& covariance);
 
   // True if a landmark of this octave and zoom occupies the cell of d.
   [[nodiscard]] bool cell_taken(const Vector3<double>& d, int octave, int zoom = 0) const;
 
   // Slots of all landmarks within an angle of a direction, in ascending order; writes at most
-  // `capacity`. Returns their total number: 0 if the direction or angle is not finite.
+  // `capacity`. Returns their total number: 0 unless the direction is a finite unit vector and the
+  // cosine is -1 to 1.
   [[nodiscard]] int find(const Vector3<double>& centre, double cosine_of_angle, int* slots,
                          int capacity) const;
 

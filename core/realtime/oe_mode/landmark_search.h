@@ -38,7 +38,7 @@ struct LandmarkSearchOptions {
   float zooming_warp_tolerance = 0.05F;
   float zooming_coarse_warp_tolerance = 0.1F;
   double cone_margin = 1.3;  // >= 1, see VisibleLandmarks::reset()
-  double search_sigmas = 3;  // sigmas of the prediction; first coarse range
+  double search_sigmas = 3;  // sigmas of the prediction that the first coarse search covers
   double coarse_reach_px =
       0.75;                    // px of the coarsest octave; alignment reaches it without a search
   double wide_search_px = 96;  // px of the image; search range if the first search fails
@@ -77,7 +77,9 @@ class LandmarkSearch {
   LandmarkSearch(const LandmarkSearch&) = delete;
   LandmarkSearch& operator=(const LandmarkSearch&) = delete;
 
+  // For another calibration: forgets all results.
   void reset(const Calibration& calibration);
+  // For another lens of the calibration.
   void change_lens(const Calibration& calibration) {
     visible_.change_lens(calibration, options_.cone_margin);
     knows_view_ = false;

@@ -29,7 +29,8 @@ struct LensScale {
   // From this calibration's covariance. Not learnt if f is exact or the covariance is invalid.
   [[nodiscard]] static LensScale begin(const Calibration& calibration);
 
-  // Kalman update with measurement = phi + noise. information: 1 / variance, may be 0.
+  // Kalman update of phi and of the map's offset with measurement = phi + noise. information: 1 /
+  // variance. Does nothing if phi is not learnt or information is 0.
   void learn(double measurement, double information, const Sensitivity<1>& its_sensitivity,
              Vector2<double>* offset, Matrix2<double>* offset_covariance,
              Sensitivity<2>* offset_sensitivity);

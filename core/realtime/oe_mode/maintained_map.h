@@ -60,7 +60,7 @@ class MaintainedMap {
 
   [[nodiscard]] const LandmarkMap& landmarks() const { return landmarks_; }
   [[nodiscard]] bool empty() const { return landmarks_.size() == 0; }
-  // The shear, as a frame sees it that looks where look_at() said (rad).
+  // The shear as seen by a frame at the tilt (rad) of the last look_at().
   [[nodiscard]] const MapShear& shear() const { return shear_; }
   void look_at(double tilt) { shear_.move_to(tilt); }
   // In the map's cells, of landmarks made at this focal length (px): see LandmarkMap.
@@ -72,8 +72,8 @@ class MaintainedMap {
   [[nodiscard]] bool is_useless() const { return upkeep_.is_useless(); }
   [[nodiscard]] bool is_doubtful() const { return upkeep_.is_doubtful(); }
   // Retires landmarks in view that were handed over and never found: they are gone or were never
-  // there, if the image has texture. Returns how many are left in view, or nothing if none was
-  // unproven. across_octaves: see VisibleLandmarks.
+  // there, if the image has texture. Returns how many are left in view; nothing, and retires none,
+  // if none is unproven or the image lacks texture. across_octaves: see VisibleLandmarks.
   [[nodiscard]] std::optional<int> retire_unproven(const Calibration& calibration,
                                                    const ImageOctaves& image,
                                                    const ProcessedFrame& frame,

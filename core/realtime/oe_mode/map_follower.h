@@ -1,7 +1,7 @@
 #pragma once
-// MapFollower: the map's offset while the map may be going along with what moves. As long as ground
-// and clouds are told apart by seconds of telemetry, a map bends by some tenths of a pixel, and no
-// constant offset holds for it. So for a while after something was seen to move (scene_drift.h) the
+// MapFollower: the map's offset while the map may be going along with what moves. Telemetry takes
+// seconds to show what is ground and what are clouds. Meanwhile a map bends by some tenths of a
+// pixel, and no constant offset holds for it. So for a while after something was seen to move the
 // offset is that of the last half second alone: a straight line through telemetry's angle minus the
 // map's, whose rate may be as large as that of what moves. Fixed memory, no allocation. One thread.
 
@@ -26,6 +26,7 @@ class MapFollower {
   // The map begins anew.
   void begin_map() { lines_ = {}; }
 
+  // Ignored if not finite, or without variance.
   void note(const SeenOffset& seen);
   // Something was seen to move. rate: rad/s.
   void note_moving(double time_s, double rate);
@@ -33,7 +34,8 @@ class MapFollower {
   // The map was moved, so that its offset is larger by this.
   void move_offset(const Vector2<double>& by);
 
-  // False if nothing was seen to move lately, or the map is too new. pixel: rad.
+  // False if nothing was seen to move lately, or the map is too new; *out is then not to be used.
+  // pixel: rad, the angle of one pixel.
   [[nodiscard]] bool follow(double time_s, double pixel, FollowedOffset* out) const;
 
  private:

@@ -108,11 +108,13 @@ class MapOffsetFilter {
   void begin_lens(const LensScale& lens) { lens_ = lens; }
   [[nodiscard]] const LensScale& lens() const { return lens_; }
   // Factor for the variance of phi as measured from the scale of this frame's landmarks:
-  // neighbouring frames' landmarks say the same for long.
+  // neighbouring frames share landmarks and their errors.
   [[nodiscard]] double scale_inflation(double frame_time_s) const {
     return variance_inflation(options_.shared_correlation_time_s,
                               frame_time_s - scale_learnt_time_s_);
   }
+  // Learns phi from the scale of a frame's landmarks: SolvedLens::measured, information and
+  // measured_sensitivity. Does nothing if phi is not learnt, or without information.
   void learn_scale(double frame_time_s, double measurement, double information,
                    const Sensitivity<1>& sensitivity);
   // Adds an independent error of the map's scale. by: variance.
@@ -132,7 +134,8 @@ class MapOffsetFilter {
   void forget_error() {
     for (OffsetAxisCells& cells : cells_) cells.forget_error();
   }
-  // How the cells let telemetry's angles count. noise: rad^2, of the angles without that error.
+  // How telemetry's angles count in a frame, by what the cells know of angles near them. noise:
+  // rad^2, of the angles without that error.
   [[nodiscard]] AngleErrorShare share(const AngleError& error, const Vector2<double>& noise) const;
 
   // elapsed_s has passed, and the offset may have drifted.
@@ -142,7 +145,8 @@ class MapOffsetFilter {
   // covariance of that answer.
   void begin(double frame_time_s, const Matrix2<double>& angle_covariance, bool extrapolated,
              const AngleError& error = {});
-  // A frame was answered with telemetry that was not extrapolated. False if nothing was learnt.
+  // A frame was answered with telemetry that was not extrapolated. False if the innovation is
+  // beyond max_contradiction: the offset then stays, and the cells keep what was seen.
   bool learn(double frame_time_s, const OffsetInnovation& innovation);
   // True once for each frame that was learnt from, or that telemetry contradicted.
   [[nodiscard]] bool take_seen(SeenOffset* out);

@@ -86,11 +86,13 @@ class MapShear {
   // From now on the state is for a frame that looks at this tilt: an acceleration error is another
   // rate error there.
   void move_to(double tilt);
+  // Adds the covariance that the shear gives a motion in the map.
   void add_to(Matrix6* motion_covariance) const;
+  // rad^2, of (pan, tilt).
   [[nodiscard]] Matrix2<double> angle_covariance() const;
 
-  // Adds a frame that landmarks answered. If frames are not in order of time, the curve begins
-  // anew. middle_row_time_s: s, image clock.
+  // Adds a frame that landmarks answered. If it is not later than the frame before, or by longest_s
+  // or more, the curve begins anew. middle_row_time_s: s, image clock.
   void add_frame(double middle_row_time_s, const FrameMotion<double>& motion,
                  const Matrix6& motion_covariance);
   // Angles before and after this call are not on one curve.

@@ -3,8 +3,8 @@
 // the map fits at all (PTCEE 36). landmark_maker.h makes new ones.
 // A landmark that held is refined (Kalman) in its own part of the covariance. A landmark that is
 // missed in many frames in a row, or rarely found, is retired. A map that is contradicted or lost
-// for many frames in a row is useless. A handed-over map is doubted sooner, if its landmarks should
-// be in view and are not found.
+// for many frames in a row is useless. A map whose landmarks should be in view and are not found is
+// doubtful sooner: then handed-over landmarks that were never found go.
 // No allocation. One thread.
 
 #include <vector>
@@ -26,9 +26,9 @@ struct MapUpkeepOptions {
   // Share of a measurement's covariance that a landmark always keeps: textures alias, and the light
   // changes.
   double least_covariance = 0.01;
-  int contradictions_to_forget = 50;  // frames in a row until the map is useless
-  int lost_to_forget = 1000;          // frames in a row
-  int missed_to_doubt = 50;           // frames in a row without landmarks that should be seen
+  int contradictions_to_forget = 50;  // frames in a row; with more the map is useless
+  int lost_to_forget = 1000;          // frames since landmarks held; with more it is useless
+  int missed_to_doubt = 50;           // of these, without landmarks that should be seen: doubtful
 
   // False if a value is invalid. *error, if not null, then says which in one line.
   [[nodiscard]] bool validate(const char** error = nullptr) const;
@@ -48,7 +48,7 @@ class MapUpkeep {
   // view.
   void note_lost(bool contradiction, bool missed);
 
-  // True after too many such frames in a row.
+  // True after more such frames than the options allow.
   [[nodiscard]] bool is_useless() const {
     return contradictions_ > options_.contradictions_to_forget || lost_ > options_.lost_to_forget;
   }
@@ -73,10 +73,9 @@ class MapUpkeep {
             LandmarkMap* map) const;
 
   MapUpkeepOptions options_;
-  // Frames in a row.
-  int contradictions_ = 0;
-  int lost_ = 0;
-  int missed_ = 0;
+  int contradictions_ = 0;  // frames in a row
+  int lost_ = 0;            // frames since landmarks held
+  int missed_ = 0;          // of these
 };
 
 }  // namespace alidade

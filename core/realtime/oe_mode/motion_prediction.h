@@ -1,10 +1,11 @@
 #pragma once
 // MotionPrediction: the camera's motion in a frame before its image is used, from telemetry or,
 // without it, from the previous frame.
-// From telemetry: its angles and rates in true units, minus the map's offset. From the previous
-// frame: its angle and rate, extrapolated. The covariance then allows for an acceleration, whose
-// sigma is the smaller of acceleration_fields and InterpolatedPanTilt::acceleration_sigma. No
-// allocation. One thread.
+// From telemetry: its angles and rates in true units, minus the map's offset, and its acceleration
+// if InterpolatedPanTilt::acceleration_sigma is below acceleration_fields. From the previous frame:
+// its angle and rate, extrapolated. The covariance allows for an error of the acceleration: with
+// the smaller of these two sigmas, after a previous frame with acceleration_fields. No allocation.
+// One thread.
 
 #include "core/model/calibration.h"
 #include "core/model/rolling_shutter.h"
@@ -68,8 +69,8 @@ class MotionPrediction {
   // The previous motion, extrapolated with its acceleration. Needs follows(frame_time_s).
   [[nodiscard]] FrameMotion<double> last_carried_on(double frame_time_s) const;
 
-  // rad, of an angle of last_carried_on(): what an acceleration may have changed. Infinite if
-  // there is no frame to carry on.
+  // rad, of an angle of last_carried_on(): what an acceleration may have changed. Infinite unless
+  // follows(frame_time_s).
   [[nodiscard]] double carried_on_sigma(double frame_time_s) const;
 
   // covariance: of motion, from the frame's own noise. shared_covariance: rad^2, of its angles,

@@ -18,10 +18,10 @@ class MovingDirections {
   void clear() { count_ = 0; }
 
   // d: unit. rate: rad/s, (pan, tilt) by which the camera would have to turn for the same change in
-  // the picture. radius: rad.
+  // the image. radius: rad. Ignored if d or rate is not finite.
   void add(const Vector3<double>& d, const Vector2<double>& rate, double radius, double time_s);
 
-  // False if nothing is remembered.
+  // True if d is within the radius of a remembered direction, moved on to time_s (s, image clock).
   [[nodiscard]] bool contains(const Vector3<double>& d, double time_s) const;
 
  private:

@@ -43,10 +43,12 @@ enum class OeStatus {
   kTooFew,         // too few landmarks held: telemetry alone
   kContradiction,  // landmarks and telemetry exclude each other: telemetry, covering both
   kSceneMoves,     // what is in view moves, or it is not known what of it: telemetry alone
-  kNoPrediction,   // neither telemetry nor a previous frame: nothing is written
-  kBadImage,       // no image, or not of the calibration's size: telemetry alone
-  kLensMoves,      // no map begins with a moving lens, or the lens is unknown: telemetry alone
-  kNotFinite       // nothing is written
+  // No telemetry, and no recent frame, image or landmarks instead; or a calibration that reset()
+  // cannot use: nothing is written.
+  kNoPrediction,
+  kBadImage,   // no image, or not of the calibration's size: telemetry alone
+  kLensMoves,  // no map begins with a moving lens, or the lens is unknown: telemetry alone
+  kNotFinite   // a time or a result is not finite: *out must not be used
 };
 
 struct OeStatistics {
@@ -83,8 +85,9 @@ class OeMode {
   OeMode(const OeMode&) = delete;
   OeMode& operator=(const OeMode&) = delete;
 
-  // Begins anew with an empty map, which starts in the frame of the first telemetry. Real-time
-  // safe.
+  // Begins anew with an empty map, which starts in the frame of the first telemetry. If the
+  // calibration's image size or focal length is not positive, or the size exceeds the options',
+  // every frame is kNoPrediction. Real-time safe.
   void reset(const Calibration& calibration, FocalLength focal_length = FocalLength::kCalibrated);
   // The same with this map: made with this calibration, by this mount, with no restart since that
   // moved its zero. OE mode starts with its first frame. Invalid landmarks, and those without room,
@@ -104,7 +107,7 @@ class OeMode {
   //   5 answer, and learn the map's offset                          map_offset_filter.h
   // frame_time_s: t0, row 0 on the image clock. at_middle_row: telemetry at t0 + clock_offset +
   // line_delay * height / 2; null if there is none. The image must outlive the next maintain().
-  // *out is written with every status but kNoPrediction and kNotFinite.
+  // *out is valid with every status but kNoPrediction and kNotFinite.
   // Extrapolated telemetry is a prior for this frame only: the map's offset does not learn from it,
   // and the frame becomes pending.
   [[nodiscard]] OeStatus process(const ImageView& image, double frame_time_s,
@@ -153,7 +156,7 @@ class OeMode {
   // map's. Replaces an earlier one. False if the frame has no answer. Once measured, all answers,
   // also PT's, are in that base, whatever becomes of map and calibration (base_tie.h).
   bool ask_about_base() { return tie_.ask(); }
-  // The measurement. False if what is known is better, or none was announced.
+  // The measurement. False if what is known is better, or if none was announced or it is invalid.
   bool settle_base(const BaseMeasurement& measurement) {
     return tie_.settle(measurement, offset_.offset());
   }

@@ -33,8 +33,8 @@ struct LookOptions {
   // Factor of the landmarks' covariances, > 1. Beyond it the lens may have moved unnoticed, though
   // all landmarks may still be inliers.
   double misfit = 6;
-  // 0 to 1; a lens found by another look holds only if its own factor of the covariances is less
-  // than this share of the factor before.
+  // 0 to 1; if enough landmarks held before (least_held), a lens found by another look holds only
+  // if its own factor of the covariances is less than this share of the factor before.
   double better = 0.5;
   // px, in the image's corners, > 0; a lens found farther from the expected one is looked through
   // again.

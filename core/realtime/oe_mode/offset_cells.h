@@ -67,8 +67,8 @@ class OffsetAxisCells {
 
   // A^2 and L beyond those stated, estimated from the scatter of the cells (DerSimonian and Laird).
   struct Scatter {
-    double variance = 0;  // rad^2
-    double length = 0;    // rad
+    double variance = 0;  // rad^2; 0: the cells scatter no more than by chance
+    double length = 0;    // rad; with a variance
     int freedom = 0;      // degrees, 0: too few cells
   };
   [[nodiscard]] Scatter scatter() const;

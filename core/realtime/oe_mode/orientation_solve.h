@@ -113,8 +113,8 @@ struct SolvedMotion {
   SolvedZoom zoom;                                                        // if the prior has a zoom
   int inliers = 0;
   double inflation = 1;  // of the landmarks' covariances, without MotionPrior::sharing
-  // The inliers' residuals, and their averages over sixths of the picture; these also one by one,
-  // in standard deviations, 0 where no landmark is.
+  // The inliers' residuals, and their averages over sixths of the image; these also one by one, in
+  // standard deviations, 0 for a sixth without landmarks.
   ResidualSquares single_squares;
   ResidualSquares large_squares;
   LargeAverages large_averages{};
@@ -137,10 +137,10 @@ struct SolveLimits {
   [[nodiscard]] bool validate(const char** error = nullptr) const;
 };
 
-// width, height: px, of the image. half_readout_s: scale of the rows' times.
-// Robust: starts at the component-wise median of the landmarks' own angles. Weights fall with the
-// residual (Geman-McClure), and the scale shrinks to that of the residuals. Then landmarks within
-// the gate count fully, the others not at all. Up to half of the landmarks may be wrong.
+// width, height: px, of the image. half_readout_s: s, any sign; scale of the rows' times.
+// Robust (orientation_inliers.h): up to half of the landmarks may be wrong. Writes the landmarks'
+// outputs. *out is complete with kOk. With kContradiction it has the squares, the landmarks' common
+// error and the innovation, which then lacks what phi explains; no correction.
 // Covariance: that of the linear problem, multiplied by the factor by which squares of residuals
 // exceed their covariances; residuals count single or averaged over neighbours (within a tenth of
 // the image's width), as averages reveal common errors. It is multiplied by prior.sharing, too. The

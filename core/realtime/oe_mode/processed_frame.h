@@ -44,8 +44,8 @@ struct ProcessedFrame {
   Sensitivity<6> sensitivity = Sensitivity<6>::Zero();  // of motion
   double inflation = 1;  // of the landmarks' covariances, from their residuals
   OwnLens lens;
-  bool solved = false;  // landmarks agreed with each other, whatever telemetry said
-  const MovingDirections* moving = nullptr;  // where no landmark is made; null: everywhere
+  bool solved = false;  // landmarks agreed with each other, with or without telemetry
+  const MovingDirections* moving = nullptr;  // where no landmark is made; null: no such place
 };
 
 }  // namespace alidade

@@ -52,19 +52,20 @@ class SceneDrift {
   void note(const SeenOffset& seen);
   // Begins a frame in which landmarks held. rate: rad/s, the camera's.
   void begin_frame(double time_s, const Vector2<double>& rate);
-  // d: unit, where it was found, in the map's frame.
+  // d: unit, where it was found, in the map's frame. Ignored at elevations beyond +-1.4 rad, and
+  // beyond kMaxFoundLandmarks landmarks of a frame.
   void note_landmark(int slot, std::uint32_t id, const Vector3<double>& d);
-  // Of that frame. pixel: rad.
+  // The verdict on that frame. pixel: rad, the angle of one pixel.
   SceneVerdict judge(double pixel);
 
   // By the latest verdict. A withheld answer is telemetry's.
   [[nodiscard]] bool withholds() const { return on_trial_ || verdict_ == SceneVerdict::kUndecided; }
   // A new map has to prove itself, as what was in view before moved.
   [[nodiscard]] bool is_on_trial() const { return on_trial_; }
-  // rad^2, of (pan, tilt): by how much the map may have drifted along without anything being
-  // shown yet.
+  // rad^2, of (pan, tilt): by how much the map may have drifted along with what moves, although no
+  // verdict says so yet.
   [[nodiscard]] const Matrix2<double>& doubt() const { return doubt_; }
-  // Whether that is by less than a second of telemetry, so that its noise alone often shows some.
+  // True if doubt() is from less than a second of telemetry: its noise alone then often gives some.
   [[nodiscard]] bool is_young() const;
 
   // The frame's landmarks that move, by the latest verdict: calls use(slot, id, d, rate).
@@ -87,7 +88,8 @@ class SceneDrift {
   [[nodiscard]] std::size_t memory_bytes() const { return records_.capacity() * sizeof(Record); }
 
  private:
-  // Sums for a straight line through what was seen, older values count less.
+  // Sums for a straight line of y over t; older values count less. t: s since first_s. y: rad, the
+  // change of place since then, with the opposite sign.
   struct Record {
     std::uint32_t id = 0;
     Vector2<double> first = Vector2<double>::Zero();  // rad, azimuth and elevation
@@ -104,15 +106,15 @@ class SceneDrift {
     int slot = 0;
     std::uint32_t id = 0;
     Vector3<double> d = Vector3<double>::Zero();
-    bool tested = false;
-    bool apart = false;
-    Vector2<double> rate = Vector2<double>::Zero();
-    double variance = 0;
+    bool tested = false;                             // seen long enough for a rate
+    bool apart = false;                              // of the group that the map does not follow
+    Vector2<double> rate = Vector2<double>::Zero();  // rad/s
+    double variance = 0;                             // (rad/s)^2
     double life_s = 0;
   };
   struct Rate {
-    Vector2<double> value = Vector2<double>::Zero();
-    Vector2<double> variance = Vector2<double>::Zero();
+    Vector2<double> value = Vector2<double>::Zero();     // rad/s
+    Vector2<double> variance = Vector2<double>::Zero();  // (rad/s)^2
     double misfit = 0;  // mean square of what is left, 1: its noise
   };
 
@@ -133,8 +135,8 @@ class SceneDrift {
   Vector2<double> begun_angle_ = Vector2<double>::Zero();
   double noted_s_ = 0;
   bool has_offsets_ = false;
-  double time_s_ = 0;  // of the frame
-  double mean_square_rate_ = 0;
+  double time_s_ = 0;            // of the frame
+  double mean_square_rate_ = 0;  // (rad/s)^2, of the camera
   SceneVerdict verdict_ = SceneVerdict::kRest;
   Vector2<double> rate_ = Vector2<double>::Zero();  // against telemetry
   Vector2<double> apart_rate_ = Vector2<double>::Zero();

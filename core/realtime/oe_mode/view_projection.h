@@ -5,7 +5,7 @@
 // row is found by a secant from a first guess. A zooming lens (FrameMotion::zoom_rate) scales the
 // direction's third component by exp(-zoom_rate t).
 // Pure; no allocation. Directions outside the image are projected too, as far as the camera model
-// goes.
+// goes and, with a rolling shutter, up to half an image height above and below.
 
 #include <Eigen/Core>
 #include <algorithm>
@@ -50,7 +50,8 @@ class ViewProjection {
     to_middle_row_ = camera_.focal_length / calibration.camera.focal_length;
   }
 
-  // False if the camera has no pixel for it, or the row does not converge.
+  // False if the camera has no pixel for it, its row is too far outside the image, or the row does
+  // not converge; the output is then not to be used, here and below.
   [[nodiscard]] bool project(const Vector3<double>& d, Vector2<double>* u) const {
     Path path;
     return find(d, &path, u);

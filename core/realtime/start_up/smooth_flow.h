@@ -24,11 +24,13 @@ class SmoothFlow {
  public:
   SmoothFlow(int width, int height, int max_samples);
 
+  // The same motion everywhere, px.
   void set_uniform(const Vector2<double>& moved);
 
   // Starts from the present flow, which must be right to a few times the samples' errors. Uses at
   // most max_samples. Returns the standard deviation of the residuals per component (px), but at
-  // least `sigma`. With fewer than 4 samples the flow is unchanged and the result is infinity.
+  // least `sigma` (px, > 0; of a sample). With fewer than 4 samples the flow is unchanged and the
+  // result is infinity.
   double fit(const FlowSample* samples, int count, double sigma);
 
   [[nodiscard]] Vector2<double> at(const Vector2<double>& u) const;

@@ -4,7 +4,8 @@
 // so a wrong value of these cannot do harm.
 // An observation is the place of a landmark in a frame: px, as in CONVENTIONS.md. Its covariance is
 // that of errors which differ between the observations of a landmark (docs/derivations.md). A point
-// ends if it leaves the image or is not found in two successive frames; later it is a new landmark.
+// ends if it leaves the image, is warped too far, keeps moving against the others, or is not found
+// in two successive frames; later it is a new landmark.
 // Shifts of up to a third of the image between frames are followed; frames with nothing in common
 // end all points. Only the constructor allocates; nothing waits or throws after it. One thread.
 
@@ -38,7 +39,7 @@ struct TrackObservation {
 
 enum class StartUpStatus {
   kOk,
-  kBegun,    // no points to follow; all are new
+  kBegun,    // no points to follow, or all were lost twice in a row; all are new
   kLost,     // the points were not found; the next frame is compared with the same previous frame
   kBlank,    // nothing to follow and nothing new
   kBadImage  // no image, another size than the constructor's, or below 64 x 32 px
@@ -70,7 +71,7 @@ class StartUpTracker {
   //   3 each point is aligned with its image in the frame where it was found, so that nothing
   //   drifts; the image is warped by the gradients of the motion since then (patch_alignment.h)
   //   4 points that contradict the others' motion are rejected
-  //   5 new points, FAST corners, where there are none
+  //   5 new points, FAST corners, are made at places without any
   // The image need not outlive the call.
   [[nodiscard]] StartUpStatus process(const ImageView& image);
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace alidade {
 namespace {
@@ -14,9 +15,17 @@ constexpr double kLongestGap_s = 0.3;  // between images of one motion
 constexpr double kMoves = 5;
 constexpr int kLeastDegrees = 8;
 constexpr double kMostLagged = 0.95;  // correlation of neighbours
+// Share of the samples, at least, that the variance of the residuals comes from.
+constexpr double kCompared = 0.5;
+// Samples that a candidate could not be compared with are taken for as well explained as the
+// others, and by so many standard deviations of chi-square better.
+constexpr double kDoubt = 2;
 constexpr double kSure_s = 0.012;
 // Share of the angle's noise that may be common to a whole motion, as a gear's error is.
 constexpr double kCommon = 0.5;
+// Of a shared error's square: the part that a stretch's zero does not take up. It is about the same
+// in all samples of a stretch.
+constexpr double kShared = 0.15;
 constexpr double kAlike = 3;        // standard deviations
 constexpr double kImprobable = 20;  // -log of a likelihood ratio
 constexpr double kLeastSigma_s = 2e-4;
@@ -80,13 +89,13 @@ void LinkDelay::break_images() {
   has_last_ = false;
 }
 
-void LinkDelay::add(const TelemetrySample& sample) {
+void LinkDelay::add(const TelemetrySample& sample, const Vector2<double>& error_variance) {
   const bool repeats = has_last_ && sample.pan == last_.pan && sample.tilt == last_.tilt;
   const bool is_late = has_last_ && !(sample.time_s > last_.time_s);
   if (repeats || is_late || !std::isfinite(sample.pan + sample.tilt + sample.time_s)) return;
   last_ = sample;
   has_last_ = true;
-  samples_.push(sample);
+  samples_.push({sample, {error_variance.x(), error_variance.y()}});
 }
 
 void LinkDelay::add(const ImageAngles& image) {
@@ -107,78 +116,116 @@ void LinkDelay::add(const ImageAngles& image) {
     }
   }
   images_.push(next);
-  while (samples_.size() > 0 && samples_[0].time_s + kRange_s <= next.time_s) {
-    compare(samples_[0]);
+  while (samples_.size() > 0 && samples_[0].reading.time_s + kRange_s <= next.time_s) {
+    sum(samples_[0]);
     samples_.pop();
   }
+  if (state_ == LinkDelayState::kOpen) find_early();
 }
 
-void LinkDelay::compare(const TelemetrySample& sample) {
-  if (images_.size() < 2 || !(images_[0].time_s <= sample.time_s - kRange_s)) return;
+// At the candidates for whose time there are images.
+void LinkDelay::compare(const Sample& sample, std::array<Stretch, 2>* stretch) const {
+  const TelemetrySample& reading = sample.reading;
+  const double first = images_[0].time_s;
+  const double last = images_[images_.size() - 1].time_s;
+  const auto time_of = [&](std::size_t k) {
+    return reading.time_s + kRange_s - kStep_s * static_cast<double>(k);
+  };
+  std::size_t begin = 0;
+  while (begin < kCandidates && time_of(begin) > last) ++begin;
+  std::size_t end = begin;
   std::array<std::array<double, kCandidates>, 2> angles;
-  std::size_t i = images_.size() - 2;
-  for (std::size_t k = 0; k < kCandidates; ++k) {
-    const double t = sample.time_s + kRange_s - kStep_s * static_cast<double>(k);
+  for (std::size_t i = images_.size() - 2; end < kCandidates; ++end) {
+    const double t = time_of(end);
+    if (!(t >= first)) break;
     while (i > 0 && images_[i].time_s > t) --i;
     const ImageAngles& a = images_[i];
     const ImageAngles& b = images_[i + 1];
     const double h = b.time_s - a.time_s;
     const Hermite cubic((t - a.time_s) / h, h);
-    angles[0][k] = cubic.at(a.angle.pan, b.angle.pan, a.rate.pan, b.rate.pan);
-    angles[1][k] = cubic.at(a.angle.tilt, b.angle.tilt, a.rate.tilt, b.rate.tilt);
+    angles[0][end] = cubic.at(a.angle.pan, b.angle.pan, a.rate.pan, b.rate.pan);
+    angles[1][end] = cubic.at(a.angle.tilt, b.angle.tilt, a.rate.tilt, b.rate.tilt);
   }
-  if (stretch_[0].samples + stretch_[1].samples == 0) stretch_since_s_ = sample.time_s;
-  if (sample.time_s > stretch_since_s_ + kStretch_s) {
-    close_stretch();
-    stretch_since_s_ = sample.time_s;
-  }
-  const std::array<double, 2> measured = {sample.pan, sample.tilt};
+  if (end < begin + 2) return;
+  const std::array<double, 2> measured = {reading.pan, reading.tilt};
   for (std::size_t axis = 0; axis < 2; ++axis) {
     const auto& shown = angles[axis];
-    const auto ends = std::minmax_element(shown.begin(), shown.end());
+    const auto ends = std::minmax_element(shown.begin() + begin, shown.begin() + end);
     if (!(*ends.second - *ends.first > kMoves * angle_sigma_)) continue;
-    Stretch& s = stretch_[axis];
-    if (s.samples == 0) s.reference = measured[axis] - shown[kCentre];
-    for (std::size_t k = 0; k < kCandidates; ++k) {
+    Stretch& s = (*stretch)[axis];
+    if (s.samples == 0) s.reference = measured[axis] - shown[begin];
+    double square = 0;
+    for (std::size_t k = begin; k < end; ++k) {
       const double residual = wrap_angle(measured[axis] - s.reference - shown[k]);
       s.sum[k] += residual;
       s.squares[k] += residual * residual;
-      if (s.samples > 0) {
+      if (s.count[k] > 0) {
         s.lagged[k] += residual * s.before[k];
       } else {
         s.begin[k] = residual;
       }
       s.before[k] = residual;
+      ++s.count[k];
+      if (k > begin) square += (shown[k] - shown[k - 1]) * (shown[k] - shown[k - 1]);
     }
-    double square = 0;
-    for (std::size_t k = 1; k < kCandidates; ++k)
-      square += (shown[k] - shown[k - 1]) * (shown[k] - shown[k - 1]);
-    s.square_rate += square / (kCandidates - 1) / (kStep_s * kStep_s);
+    s.square_rate += square / static_cast<double>(end - begin - 1) / (kStep_s * kStep_s);
+    s.shared += sample.error_variance[axis];
     ++s.samples;
   }
-  if (state_ != LinkDelayState::kOpen) return;
-  const Told told = judge(with_stretch());
+}
+
+void LinkDelay::sum(const Sample& sample) {
+  const double time_s = sample.reading.time_s;
+  if (images_.size() < 2) return;
+  if (stretch_[0].samples + stretch_[1].samples == 0) stretch_since_s_ = time_s;
+  if (time_s > stretch_since_s_ + kStretch_s) {
+    close_stretch();
+    stretch_since_s_ = time_s;
+  }
+  compare(sample, &stretch_);
+}
+
+bool LinkDelay::moves() const {
+  Vector2<double> least = images_[0].angle.vector();
+  Vector2<double> most = least;
+  for (std::size_t i = 1; i < images_.size(); ++i) {
+    least = least.cwiseMin(images_[i].angle.vector());
+    most = most.cwiseMax(images_[i].angle.vector());
+  }
+  return (most - least).maxCoeff() > kMoves * angle_sigma_;
+}
+
+// Takes the samples, too, that only part of the candidates can be compared with as yet: the
+// pictures of kRange_s after them are to come.
+void LinkDelay::find_early() {
+  if (images_.size() < 2 || !moves()) return;
+  std::array<Stretch, 2> stretch = stretch_;
+  for (std::size_t i = 0; i < samples_.size(); ++i) compare(samples_[i], &stretch);
+  const Told told = judge(with(stretch));
   if (told.sure) take(told);
 }
 
 void LinkDelay::add_stretch(const Stretch& stretch, Sums* sums) {
   if (stretch.samples < 2) return;
-  const double n = stretch.samples;
   for (std::size_t k = 0; k < kCandidates; ++k) {
+    if (stretch.count[k] < 2) continue;
+    const double n = stretch.count[k];
     const double mean = stretch.sum[k] / n;
     sums->squares[k] += std::max(0.0, stretch.squares[k] - n * mean * mean);
     // Of r_i - mean: each residual is in two products, but for the first and the last.
     sums->lagged[k] +=
         stretch.lagged[k] - mean * ((n + 1) * mean - stretch.begin[k] - stretch.before[k]);
+    sums->degrees[k] += n - 1;
   }
-  sums->degrees += n - 1;
   sums->square_rate += stretch.square_rate;
-  sums->samples += n;
+  sums->shared += stretch.shared;
+  sums->samples += stretch.samples;
+  sums->stretches += 1;
 }
 
-LinkDelay::BothAxes LinkDelay::with_stretch() const {
+LinkDelay::BothAxes LinkDelay::with(const std::array<Stretch, 2>& stretch) const {
   BothAxes sums = sums_;
-  for (std::size_t axis = 0; axis < 2; ++axis) add_stretch(stretch_[axis], &sums[axis]);
+  for (std::size_t axis = 0; axis < 2; ++axis) add_stretch(stretch[axis], &sums[axis]);
   return sums;
 }
 
@@ -197,10 +244,12 @@ void LinkDelay::close_stretch() {
       for (std::size_t k = 0; k < kCandidates; ++k) {
         b.squares[k] = fade * b.squares[k] + a.squares[k];
         b.lagged[k] = fade * b.lagged[k] + a.lagged[k];
+        b.degrees[k] = fade * b.degrees[k] + a.degrees[k];
       }
-      b.degrees = fade * b.degrees + a.degrees;
+      b.shared = fade * b.shared + a.shared;
       b.square_rate = fade * b.square_rate + a.square_rate;
       b.samples = fade * b.samples + a.samples;
+      b.stretches = fade * b.stretches + a.stretches;
     }
   };
   if (state_ != LinkDelayState::kOpen) {
@@ -232,26 +281,47 @@ void LinkDelay::close_stretch() {
 
 LinkDelay::Told LinkDelay::judge(const BothAxes& sums) const {
   Told out;
-  std::array<double, kCandidates> q{};  // chi-square
-  double freedom = 0;                   // independent residuals
-  double degrees = 0;
+  std::array<double, kCandidates> q{};        // chi-square
+  std::array<double, kCandidates> degrees{};  // of freedom
+  double freedom = 0;                         // independent residuals
   double square_rate = 0;
   for (const Sums& axis : sums) {
-    if (!(axis.degrees > 0)) continue;
-    const auto least = std::min_element(axis.squares.begin(), axis.squares.end());
-    const auto best = static_cast<std::size_t>(least - axis.squares.begin());
-    const double variance = std::max(angle_sigma_ * angle_sigma_, *least / axis.degrees);
+    const double most = *std::max_element(axis.degrees.begin(), axis.degrees.end());
+    if (!(most > 0)) continue;
+    std::size_t best = 0;
+    double variance = std::numeric_limits<double>::infinity();
+    for (std::size_t k = 0; k < kCandidates; ++k) {
+      if (axis.degrees[k] < kCompared * most) continue;
+      if (!(axis.squares[k] / axis.degrees[k] < variance)) continue;
+      variance = axis.squares[k] / axis.degrees[k];
+      best = k;
+    }
     const double lagged =
-        *least > 0 ? std::clamp(axis.lagged[best] / *least, 0.0, kMostLagged) : 0.0;
-    const double factor = (1 + lagged) / (1 - lagged);
-    for (std::size_t k = 0; k < kCandidates; ++k) q[k] += axis.squares[k] / (factor * variance);
-    freedom += axis.degrees / factor;
-    degrees += axis.degrees;
+        variance > 0 ? std::clamp(axis.lagged[best] / axis.squares[best], 0.0, kMostLagged) : 0.0;
+    variance = std::max(angle_sigma_ * angle_sigma_, variance);
+    const double shared = kShared * most / axis.stretches * axis.shared / axis.samples;
+    const double factor = (1 + lagged) / (1 - lagged) + shared / variance;
+    for (std::size_t k = 0; k < kCandidates; ++k) {
+      const double missing = (most - axis.degrees[k]) / factor;
+      q[k] += axis.squares[k] / (factor * variance) + missing - kDoubt * std::sqrt(2 * missing);
+      degrees[k] += axis.degrees[k];
+    }
+    freedom += axis.degrees[best] / factor;
     square_rate += axis.square_rate / axis.samples;
   }
-  if (degrees < kLeastDegrees || !(square_rate > 0)) return out;
-  const auto k = static_cast<std::size_t>(std::min_element(q.begin(), q.end()) - q.begin());
+  if (!(square_rate > 0)) return out;
+  double least = std::numeric_limits<double>::infinity();
+  std::size_t k = 0;
+  for (std::size_t i = 0; i < kCandidates; ++i) {
+    if (degrees[i] < kLeastDegrees || !(q[i] < least)) continue;
+    least = q[i];
+    k = i;
+  }
   if (k == 0 || k + 1 == kCandidates) return out;
+  // Too few samples tell nothing against a candidate.
+  for (std::size_t i = 0; i < kCandidates; ++i) {
+    if (degrees[i] < kLeastDegrees) q[i] = least;
+  }
   const double curvature = q[k - 1] - 2 * q[k] + q[k + 1];
   if (!(curvature > 0)) return out;
   const auto place = [](double index) { return (index - kCentre) * kStep_s; };

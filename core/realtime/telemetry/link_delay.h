@@ -2,11 +2,11 @@
 // LinkDelay: how much later telemetry comes, against the pictures, than the calibration says.
 //   telemetry(t + delay) = image(t) + constant
 // image(t): the mount's angles as the images show them, from any zero; t contains the calibration's
-// clock offset. Each sample is compared with image(t) at every delay of a grid within kRange_s; a
-// larger delay is not found. Once the mount has accelerated, the sums of squares give the delay and
-// its sigma, and from then on follow the delay. A delay that was believed is replaced only by one
-// that explains two stretches of motion in a row. Measured units, rad; s. Fixed memory, no
-// allocation. One thread. Derivation: docs/clocks.md.
+// clock offset. Each sample is compared with image(t) at every delay of a grid within kRange_s at
+// which there are images; a larger delay is not found. Once the mount has accelerated, the sums of
+// squares give the delay and its sigma, and from then on follow the delay. A delay that was
+// believed is replaced only by one that explains two stretches of motion in a row. Measured units,
+// rad; s. Fixed memory, no allocation. One thread. Derivation: docs/clocks.md.
 
 #include <array>
 #include <cstddef>
@@ -61,9 +61,11 @@ class LinkDelay {
   // The angles of the next image do not continue those before.
   void break_images();
 
-  // Ignored: values that are not finite; a sample that is not later than the last one, or repeats
-  // its angles.
-  void add(const TelemetrySample& sample);
+  // error_variance: rad^2, (pan, tilt), of an error that samples at neighbouring angles share, as
+  // what is left of a gear's. Ignored: values that are not finite; a sample that is not later than
+  // the last one, or repeats its angles.
+  void add(const TelemetrySample& sample,
+           const Vector2<double>& error_variance = Vector2<double>::Zero());
   void add(const ImageAngles& image);
 
   [[nodiscard]] LinkDelayState state() const { return state_; }
@@ -84,9 +86,11 @@ class LinkDelay {
   struct Sums {
     std::array<double, kCandidates> squares{};  // about the mean of each stretch
     std::array<double, kCandidates> lagged{};   // products of neighbours, likewise
-    double degrees = 0;                         // of freedom
+    std::array<double, kCandidates> degrees{};  // of freedom
     double square_rate = 0;                     // (rad/s)^2, sum over the samples
+    double shared = 0;                          // rad^2, likewise: variance of the shared error
     double samples = 0;
+    double stretches = 0;
   };
   // The stretch of motion that is being summed.
   struct Stretch {
@@ -95,9 +99,15 @@ class LinkDelay {
     std::array<double, kCandidates> lagged{};
     std::array<double, kCandidates> begin{};   // residual of the first sample
     std::array<double, kCandidates> before{};  // and of the last
+    std::array<int, kCandidates> count{};      // of the samples with an image at that time
     double reference = 0;                      // rad, near all residuals
     double square_rate = 0;
+    double shared = 0;
     int samples = 0;
+  };
+  struct Sample {
+    TelemetrySample reading;
+    std::array<double, 2> error_variance{};
   };
   using BothAxes = std::array<Sums, 2>;
   struct Told {
@@ -134,10 +144,13 @@ class LinkDelay {
   };
 
   void forget();
-  void compare(const TelemetrySample& sample);
+  void compare(const Sample& sample, std::array<Stretch, 2>* stretch) const;
+  void sum(const Sample& sample);
+  void find_early();
+  [[nodiscard]] bool moves() const;
   void close_stretch();
   static void add_stretch(const Stretch& stretch, Sums* sums);
-  [[nodiscard]] BothAxes with_stretch() const;
+  [[nodiscard]] BothAxes with(const std::array<Stretch, 2>& stretch) const;
   [[nodiscard]] Told judge(const BothAxes& sums) const;
   void take(const Told& told);
 
@@ -148,7 +161,7 @@ class LinkDelay {
   double sigma_s_ = 0;
   int found_ = 0;
   Ring<ImageAngles, kImages> images_;
-  Ring<TelemetrySample, kSamples> samples_;
+  Ring<Sample, kSamples> samples_;
   TelemetrySample last_;  // of the samples
   bool has_last_ = false;
   std::array<Stretch, 2> stretch_;

@@ -30,7 +30,7 @@ struct TelemetrySample {
 struct TelemetryLimits {
   double max_gap_s = 0.5;             // no answer between samples farther apart
   double max_extrapolation_s = 0.25;  // before the oldest and after the newest trusted angle
-  double max_repeat_s = 0.1;  // of the device, between two measurements; 0: each poll is new
+  double max_repeat_s = 0.1;  // longest time between two measurements of the device; 0: each is new
 
   // False if a value is invalid. *error, if not null, then says which in one line.
   [[nodiscard]] bool validate(const char** error = nullptr) const {
@@ -47,7 +47,7 @@ struct TelemetryLimits {
 enum class PushStatus {
   kStored,
   kOutOfOrderStored,  // older than the newest; inserted in order
-  kStaleRepeat,       // the newest value again, too soon to show that the mount stands still
+  kStaleRepeat,       // the newest value again, too soon or too late to show a mount at rest
   kDuplicateTime,     // a sample of this time exists and stays
   kOlderThanBuffer,   // older than all samples of a full buffer
   kNotFinite          // a value is not finite, or time_sigma_s is negative
@@ -162,8 +162,8 @@ class TelemetryBuffer {
   }
 
   [[nodiscard]] std::size_t size() const { return size_; }
-  // s; time of the newest trusted angle: the newest sample, or max_repeat_s before the last of a
-  // run of stale repeats.
+  // s; time of the newest trusted angle: the newest sample with a new value or, if later,
+  // max_repeat_s before its last repeat. Empty without samples.
   [[nodiscard]] std::optional<double> newest_time() const {
     if (size_ == 0) return std::nullopt;
     return knot(size_ - 1).time_s;

@@ -1,7 +1,8 @@
 #pragma once
 // TelemetryCorrection: subtracts the known errors of telemetry's angles (telemetry_error.h) from
 // the samples before they are interpolated, and adds the variance of the remaining errors to the
-// covariance of interpolated angles. phi is the true angle:
+// covariance of interpolated angles. phi is the true angle, m the angle at the other side of the
+// play, g the error curve:
 //   corrected = scale phi,   phi = play(m),   scale m + g(phi) = measured
 // Play has a state, so samples come in order of time. The state is unknown at first and after each
 // forget_state(). Fixed memory; no allocation. One thread.
@@ -20,12 +21,13 @@ class TelemetryCorrection {
                       double noise_rad);
 
   [[nodiscard]] bool exists() const { return exists_; }
-  // Values that are not finite stay as they are. A sample older than an earlier one does not move
-  // the state of the play.
+  // A sample with an angle that is not finite stays as it is. A sample older than an earlier one
+  // does not move the state of the play.
   void correct(TelemetrySample* sample);
   // Samples were lost, or the head was switched off.
   void forget_state();
-  // Adds the variance of the remaining error to the covariance.
+  // Adds the variance of the remaining error to the covariance, and sets error_variance and
+  // error_length: 0 if nothing is corrected.
   void add_left(InterpolatedPanTilt* measured) const;
 
  private:
@@ -36,7 +38,7 @@ class TelemetryCorrection {
     bool begun = false;
     double reading = 0;  // rad, of the newest sample
     double off = 0;      // rad, reading minus corrected
-    double by_play = 0;  // rad, of it
+    double by_play = 0;  // rad, m minus phi
     double play_sigma = 0;
 
     void take(double measured, double noise_rad);

@@ -19,9 +19,9 @@ struct TelemetryNoise {
   double pan_tilt_sigma = 1e-4;   // rad, white noise of one measured angle
   double resolution = 0;          // rad, smallest step of a measured angle; 0: none
   double period_sigma_s = 50e-6;  // s, of the time between two neighbouring samples
-  // rad/s^2, one standard deviation; acceleration expected of either axis where the samples do not
-  // show it: near a jerk, and with too few samples. Beyond the newest sample it is the minimum. 0:
-  // the mount keeps its rate.
+  // rad/s^2, one standard deviation; acceleration expected of either axis if the samples do not
+  // show it: near a jerk, and with too few samples. Beyond the samples it is the lower limit of
+  // ExpectedAcceleration. 0: the mount keeps its rate.
   double acceleration_sigma = 0.1;
 
   // False if a value is invalid. *error, if not null, then says which in one line.
@@ -70,11 +70,11 @@ class ExpectedAcceleration {
  public:
   static constexpr double kMemory = 5;  // s; older knots are not needed
 
-  // s, of the differences; about the time to extrapolate.
+  // step_s: s; knots of a difference are about this far apart or more: the time to extrapolate.
   ExpectedAcceleration(const TelemetryNoise& noise, double step_s);
   void add(const TelemetryKnot& knot);
   // Squares (pan, tilt), (rad/s^2)^2. At least acceleration_sigma's, and what stops the latest rate
-  // within a second.
+  // within a second. 0 if acceleration_sigma is 0.
   [[nodiscard]] Vector2<double> square() const;
 
  private:
@@ -93,7 +93,8 @@ inline constexpr int kInterpolationWindow = 8;
 // knots[0..count): 2 <= count <= kInterpolationWindow, times strictly ascending. time_s lies
 // between knots[before] and knots[before + 1], or beyond the nearer end. beyond_square:
 // (rad/s^2)^2, (pan, tilt), expected accelerations beyond the ends.
-// False if the result cannot be represented; *out is then unchanged.
+// Does not write error_variance, error_length, acceleration and acceleration_sigma. False if the
+// result cannot be represented; *out is then unchanged.
 [[nodiscard]] bool interpolate(const TelemetryNoise& noise, const TelemetryKnot* knots, int count,
                                int before, double time_s, double time_sigma_s,
                                const Vector2<double>& beyond_square, InterpolatedPanTilt* out);

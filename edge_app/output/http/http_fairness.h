@@ -15,13 +15,16 @@ namespace alidade {
 using HttpAddress = boost::asio::ip::address_v6;
 [[nodiscard]] HttpAddress http_address(const boost::asio::ip::address& peer);
 
-// Limits the requests a second of all addresses together. Each address that asked within the last
-// second has the same share. At once an address may use its share of one second, or one request if
-// the share is less. An address may use more while others leave more than half of a second's
-// requests. Beyond kMaxAddresses, all further addresses have one share together.
+// Limits the requests a second of all addresses together. All addresses that asked within the last
+// second have equal shares. At once an address may use its share of one second, or one request if
+// the share is less. It may use more while others leave more than half of a second's requests.
+// Beyond kMaxAddresses, all further addresses have one share together. As each new address may ask
+// once at once, a burst of new addresses may exceed per_s.
 class FairRate {
  public:
+  // per_s: requests a second, more than 0.
   explicit FairRate(double per_s);
+  // Counts one request. False: beyond the limit, to be refused. now_s: s, monotonic, as below.
   [[nodiscard]] bool take(const HttpAddress& address, double now_s);
   [[nodiscard]] std::size_t addresses() const { return accounts_.size(); }
 
@@ -46,6 +49,7 @@ class FairRate {
 class RecentAddresses {
  public:
   void add(const HttpAddress& address, double now_s);
+  // True if the address was added within kRecentS and is not forgotten.
   [[nodiscard]] bool has(const HttpAddress& address, double now_s) const;
 
   static constexpr std::size_t kMost = 1024;
@@ -55,11 +59,12 @@ class RecentAddresses {
   std::map<HttpAddress, double> last_s_;
 };
 
-// A number of places, in the order in which they were taken, each with the address that holds it.
-// Does not allocate after construction.
+// A limited number of places, in the order in which they were taken, each with its holder and the
+// address that holds it. Does not allocate after construction.
 template <typename Holder>
 class FairPlaces {
  public:
+  // most: number of places; less than 1 is taken for 1.
   explicit FairPlaces(int most) : most_(static_cast<std::size_t>(std::max(1, most))) {
     places_.reserve(most_);
     shares_.reserve(most_);
@@ -99,6 +104,7 @@ class FairPlaces {
       ++share->places;
   }
 
+  // Does nothing if the holder has no place.
   void leave(const Holder* holder) {
     const auto found = std::find_if(places_.begin(), places_.end(),
                                     [&](const Place& place) { return place.holder == holder; });

@@ -23,7 +23,8 @@ struct HttpLimits {
   double head_timeout_s = 5;    // from the connection to the last byte of the head
   double body_timeout_s = 10;   // from the last byte of the head to that of the body
   double write_timeout_s = 10;  // without a byte taken by the client
-  // For all strangers together, and the same for all with a token; shared by their addresses.
+  // For all strangers together, and the same for all with a token; shared by their addresses. With
+  // TLS the same again for handshakes, of either group.
   double requests_per_s = 500;
 };
 

@@ -5,7 +5,7 @@
 //
 //   one token       the first line of the file; it may do everything
 //   several         one a line, `view TOKEN` or `control TOKEN`; empty lines and lines that begin
-//                   with # are skipped
+//                   with # are skipped; at most 1000
 // A token has at least kShortestToken visible ASCII characters. For the network thread, except
 // construction and parse_tokens().
 

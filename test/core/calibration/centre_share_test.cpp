@@ -121,8 +121,8 @@ TEST(CentreFrame, TheCentreIsShownWhereChanceDoesNotMoveItSoFar) {
   EXPECT_FALSE(centre_is_shown(c, Vector2<double>::Zero(), kPrior));
 }
 
-// An estimate whose tilt axis leans about as far forward as down, told on either side of the jump of
-// its tangent basis: what the centre does to the axes is the same in space.
+// An estimate whose tilt axis leans about as far forward as down, told on either side of the jump
+// of its tangent basis: what the centre does to the axes is the same in space.
 TEST(CentreFrame, WhatTheCentreDoesIsAddedInTheSameDirectionsBesideAJumpOfTheBasis) {
   Calibration free;
   free.camera = {3000, 1, {0}, 640, 360};

@@ -9,23 +9,15 @@
 #include <random>
 #include <string>
 
+#include "test/core/calibration/narrow_camera.h"
 #include "test/support/simulated_recording.h"
 
 namespace alidade {
 namespace {
 
+using test::narrow_camera;
 using test::SimulatedRecording;
 using test::Simulation;
-
-Simulation narrow_camera(std::uint64_t seed) {
-  Simulation s;
-  s.seed = seed;
-  s.focal_length = 20000;
-  s.landmarks_per_field = 7;
-  s.image_stamp_sigma_s = 3e-4;
-  s.telemetry_stamp_sigma_s = 3e-4;
-  return s;
-}
 
 // Calls either for each reading with the true angles and rates, and for each observation with its
 // time and place from the middle.

@@ -12,6 +12,7 @@
 #include "core/calibration/calibrate.h"
 #include "core/calibration/common_nearness.h"
 #include "test/core/calibration/adjustment_scene.h"
+#include "test/core/calibration/narrow_camera.h"
 #include "test/support/simulated_recording.h"
 
 namespace alidade {
@@ -28,6 +29,7 @@ using internal::ObservationRow;
 using internal::part_of_mean_nearness;
 using internal::TelemetryRow;
 using test::AdjustmentScene;
+using test::narrow_camera;
 using test::SimulatedRecording;
 using test::Simulation;
 
@@ -160,16 +162,6 @@ CalibrationResult calibrate_near(const Simulation& s, double nearest_m, double f
   return calibrate(recording.input, options);
 }
 
-Simulation near_camera(std::uint64_t seed) {
-  Simulation s;
-  s.seed = seed;
-  s.focal_length = 20000;
-  s.landmarks_per_field = 7;
-  s.image_stamp_sigma_s = 3e-4;
-  s.telemetry_stamp_sigma_s = 3e-4;
-  return s;
-}
-
 double error_in_sigmas(const Simulation& s, const CalibrationResult& result, Parameter parameter) {
   return test::calibration_error(s, result.calibration)[index(parameter)] /
          parameter_sigma(result.calibration, parameter);
@@ -180,7 +172,7 @@ TEST(Nearness, ACalibrationOfANearSceneIsHonest) {
   double squares = 0;
   int count = 0;
   for (int seed = 0; seed < kRecordings; ++seed) {
-    const Simulation s = near_camera(40 + static_cast<std::uint64_t>(seed));
+    const Simulation s = narrow_camera(40 + static_cast<std::uint64_t>(seed));
     const CalibrationResult result = calibrate_near(s, 20, 60, {});
     ASSERT_TRUE(result.ok()) << result.message;
     for (const Parameter p :
@@ -199,7 +191,7 @@ TEST(Nearness, ACalibrationOfANearSceneIsHonest) {
 }
 
 TEST(Nearness, AStatedSceneAndPupilTellTheFarFocalLength) {
-  const Simulation s = near_camera(50);
+  const Simulation s = narrow_camera(50);
   CalibrationOptions options;
   options.pupil.place_m = {-0.04, 0.04, 0.06};
   options.pupil.sigma_m.setConstant(kStatedPupilSigma_m);
@@ -223,7 +215,7 @@ TEST(Nearness, AStatedSceneAndPupilTellTheFarFocalLength) {
 
 // Things that are equally near: no residual shows it.
 TEST(Nearness, AStatedSceneAtOneDistanceIsInTheSigmaThatNoResidualTells) {
-  const Simulation s = near_camera(52);
+  const Simulation s = narrow_camera(52);
   CalibrationOptions options;
   const CalibrationResult unstated = calibrate_near(s, 30, 31, options);
   options.scene = SceneDistance{30, 31};
@@ -270,7 +262,7 @@ TEST(Nearness, WhatThePicturesShowTellsHowFarThePupilIs) {
 }
 
 TEST(Nearness, AStatedSceneThatThePicturesContradictIsRefused) {
-  const Simulation s = near_camera(51);
+  const Simulation s = narrow_camera(51);
   CalibrationOptions options;
   options.scene = SceneDistance{400, 500};
   const CalibrationResult result = calibrate_near(s, 20, 60, options);

@@ -1,5 +1,5 @@
-// Points that move against their neighbours: to and fro, away, or by their noise alone; in pictures of a camera that turns
-// and rolls behind a lens with distortion.
+// Points that move against their neighbours: to and fro, away, or by their noise alone; in pictures
+// of a camera that turns and rolls behind a lens with distortion.
 
 #include "core/calibration/shimmer.h"
 

@@ -256,6 +256,16 @@ TEST_F(SceneMapFileTest, TwoWhoWriteAreToldOfEachOther) {
   EXPECT_TRUE(other.update(change_of(now, 2), &error)) << error;
 }
 
+TEST_F(SceneMapFileTest, WhoReplacesAfterAnotherHasWrittenIsSeenByTheOther) {
+  const SceneMap map = save(map_before_changes());
+  SceneMapFile one, other;
+  ASSERT_TRUE(one.open(path, &error) && other.open(path, &error)) << error;
+  ASSERT_TRUE(other.update(change_of(map, 1), &error)) << error;
+  ASSERT_TRUE(one.replace(map_before_changes(), &error)) << error;
+  EXPECT_FALSE(other.update(change_of(map, 1), &error));
+  EXPECT_NE(error.find("changed by another process"), std::string::npos) << error;
+}
+
 TEST_F(SceneMapFileTest, WhoeverWritesLongIsNotWaitedForForever) {
   const SceneMap map = save(map_before_changes());
   SceneMapFile file;

@@ -100,7 +100,8 @@ struct Case {
   bool is_exact = false;  // the mean of ratio^2 is 1; else at most 1
 };
 
-// One in a thousand may be found by chance in 400 trials: more than three with a chance of 1 in 1000.
+// One in a thousand may be found by chance in 400 trials: more than three with a chance of 1 in
+// 1000.
 TEST(KnownDirections, TrueSigmasAreNotContradictedWhetherErrorsAreAlikeOrNot) {
   constexpr TurnSigma kStated = {0.01, 0.01};
   for (const Case& is :

@@ -44,6 +44,11 @@ double hops(double t) {
   return back ? 0.39 - there : there;
 }
 
+// Moves all the time.
+PanTilt<double> figure(double t) {
+  return {0.06 * std::sin(0.5 * t + 1), 0.03 * std::sin(0.9 * t + 2)};
+}
+
 struct Link {
   double delay_s = 0;  // telemetry against pictures
   double samples_hz = 25;
@@ -52,6 +57,7 @@ struct Link {
   double step = 0;             // rad
   double gear = 0;             // rad
   double noise = kAngleNoise;  // rad
+  double error_sigma = 0;      // rad, that the gear is known to have
   double change_s = 1e9;       // when the delay becomes changed_s
   double changed_s = 0;
 };
@@ -101,7 +107,7 @@ struct Ride {
       last.tilt = reading(at.tilt);
     }
     last.time_s = now_s + phase;
-    delay.add(last);
+    delay.add(last, Vector2<double>::Constant(link.error_sigma * link.error_sigma));
   }
   void frame() {
     next_frame_s += 1 / link.frames_hz;
@@ -179,6 +185,61 @@ INSTANTIATE_TEST_SUITE_P(
                               })},
                     DelayCase{"Gear", sines, with([](Link* l) { l->gear = 2e-4; })}),
     [](const auto& one) { return one.param.name; });
+
+// The first pictures show a camera that moves already: what came before them is not known. A known
+// error of the angles makes sigma larger, and so the search longer.
+TEST(LinkDelay, OfACameraThatMovesIsFoundSoonAfterTheFirstPictures) {
+  constexpr int kRides = 12;
+  constexpr double kSmallNoise = kAngleNoise / 4;
+  struct Known {
+    double error_sigma;
+    double found_s;
+  };
+  for (const Known& known : {Known{0, 2}, Known{4e-5, 2}, Known{1e-4, 4}}) {
+    double squares = 0;
+    int count = 0;
+    for (const double delay_s :
+         {-0.4027, -0.2976, -0.0873, -0.0224, 0.0012, 0.0226, 0.0841, 0.3023, 0.3974}) {
+      for (unsigned seed = 1; seed <= kRides; ++seed) {
+        LinkDelay delay(kSmallNoise, kConnections_s);
+        delay.open();
+        Link link;
+        link.delay_s = delay_s;
+        link.noise = kSmallNoise;
+        link.error_sigma = known.error_sigma;
+        link.gear = std::sqrt(2.0) * known.error_sigma;
+        const double from_s = 0.7 * seed;
+        const Path path = [from_s](double t) { return figure(from_s + t); };
+        Ride run(&delay, path, link, seed);
+        run.go(known.found_s);
+        ASSERT_EQ(delay.state(), LinkDelayState::kFound) << delay_s << " " << seed;
+        EXPECT_LT(std::abs(run.error()), 5 * delay.sigma_s()) << delay_s << " " << seed;
+        squares += std::pow(run.error() / delay.sigma_s(), 2);
+        ++count;
+        if (known.error_sigma > 0 || seed > 1) continue;
+        // Between the candidates, which are 5 ms apart: some 300 samples with 1 ms each.
+        run.go(14);
+        EXPECT_LT(std::abs(run.error()), 5e-4) << delay_s;
+      }
+    }
+    // 99 % of chi-square for 108 values.
+    EXPECT_LT(squares / count, 1.33) << known.error_sigma;
+    EXPECT_GT(squares / count, 0.1) << known.error_sigma;
+  }
+}
+
+// An error of the angles that is as large as what the delay changes tells nothing of it.
+TEST(LinkDelay, IsNotToldThroughAnErrorOfTheAnglesThatIsLarger) {
+  LinkDelay delay(kAngleNoise, kConnections_s);
+  delay.open();
+  Link link;
+  link.delay_s = 0.02;
+  link.gear = 2e-3;
+  link.error_sigma = 2e-3;
+  Ride run(&delay, figure, link, 1);
+  run.go(20);
+  EXPECT_EQ(delay.state(), LinkDelayState::kOpen);
+}
 
 TEST(LinkDelay, IsNotToldByRestNorByAConstantRate) {
   for (const double rate : {0.0, 1e-6, 0.05, 0.4}) {
