@@ -26,8 +26,10 @@ inline constexpr NumberRange kSeconds{0.1, 3600, "s"};
 [[nodiscard]] std::string required_url(YamlSection& section, const std::string& example,
                                        const std::vector<std::string>& schemes);
 
-// The keys user and password_env.
-void read_login(YamlSection& section, std::string* user, std::string* password);
+// The keys user, password_env and password_file; the latter is relative to the configuration's
+// folder.
+void read_login(YamlSection& section, const std::string& config_path, std::string* user,
+                std::string* password);
 
 // The keys follow_redirects and auth.
 [[nodiscard]] LinkRules read_link_rules(YamlSection& section);
