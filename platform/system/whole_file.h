@@ -16,9 +16,12 @@
 namespace alidade {
 
 // First removes unfinished files that killed processes left of this file. On false the old file
-// stays, nothing unfinished is left, and *error is `path: cannot be written: why`.
+// stays, nothing unfinished is left, and *error is `path: cannot be written: why`. mode: who may
+// read and write it.
+inline constexpr unsigned kForAllToRead = 0644;
+inline constexpr unsigned kForTheOwnerOnly = 0600;
 [[nodiscard]] bool write_file_atomically(const std::string& path, const std::string& content,
-                                         std::string* error);
+                                         std::string* error, unsigned mode = kForAllToRead);
 
 // The same for a file that was written beside its place by other code.
 [[nodiscard]] bool move_into_place(const std::string& from, const std::string& to,
