@@ -1,5 +1,6 @@
 # Debian packages, by `cpack` in the build folder (scripts/package does everything): alidade, the
-# executable as a service; alidade-dev, headers, libraries and the CMake package. Must be included
+# executable as a service; alidade-dev, headers, libraries and the CMake package; where it is built,
+# alidade-simulator, the virtual camera with its examples and photos. Must be included
 # last: it packs what was installed so far.
 set(packaging ${PROJECT_SOURCE_DIR}/edge_app/packaging)
 set(packages_dir ${PROJECT_BINARY_DIR}/packaging)
@@ -57,6 +58,8 @@ install(FILES ${packaging}/copyright ${packages_dir}/changelog.gz DESTINATION /u
   COMPONENT system EXCLUDE_FROM_ALL)
 install(FILES ${packaging}/copyright ${packages_dir}/changelog.gz DESTINATION /usr/share/doc/alidade-dev
   COMPONENT dev-system EXCLUDE_FROM_ALL)
+install(FILES ${packaging}/copyright ${packages_dir}/changelog.gz DESTINATION /usr/share/doc/alidade-simulator
+  COMPONENT virtual-system EXCLUDE_FROM_ALL)
 
 # Everything that is packed; `all` would also build the tests.
 get_property(libraries GLOBAL PROPERTY ALIDADE_LIBRARIES)
@@ -70,6 +73,12 @@ foreach(library IN LISTS libraries)
     add_dependencies(packaged ${library})
   endif()
 endforeach()
+
+set(ALIDADE_SIMULATOR_EXECUTABLE "")
+if(TARGET alidade-simulate)
+  add_dependencies(packaged alidade-simulate)
+  set(ALIDADE_SIMULATOR_EXECUTABLE ${PROJECT_BINARY_DIR}/test/simulator/alidade-simulate)
+endif()
 
 # dpkg-shlibdeps reads dpkg's database of the machine or of the sysroot.
 set(ALIDADE_EXECUTABLE ${PROJECT_BINARY_DIR}/edge_app/alidade)
@@ -88,6 +97,9 @@ set(CPACK_STRIP_FILES ON)
 set(CPACK_INSTALL_DEFAULT_DIRECTORY_PERMISSIONS
   OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ WORLD_EXECUTE)
 set(CPACK_COMPONENTS_ALL runtime system dev dev-system)
+if(TARGET alidade-simulate)
+  list(APPEND CPACK_COMPONENTS_ALL virtual virtual-system)
+endif()
 set(CPACK_COMPONENTS_GROUPING ONE_PER_GROUP)
 set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
@@ -118,6 +130,14 @@ set(CPACK_COMPONENT_LIBRARIES_DESCRIPTION
 Headers, static libraries and a CMake package of Alidade, for programs that
 turn the pixels of a pan-tilt-zoom camera into directions themselves.")
 
+set(CPACK_DEBIAN_SIMULATOR_PACKAGE_NAME alidade-simulator)
+set(CPACK_DEBIAN_SIMULATOR_PACKAGE_SECTION science)
+set(CPACK_COMPONENT_SIMULATOR_DESCRIPTION
+  "virtual pan-tilt-zoom camera for Alidade
+Serves real RTSP video and real pan/tilt telemetry (VAPIX, ONVIF, heads on a
+line) of a camera whose truth is known, or writes a recording of it. Comes with
+photos and examples: alidade-simulate --example zoom --size 480x270.")
+
 include(CPack)
 cpack_add_component(runtime GROUP edge)
 cpack_add_component(system GROUP edge)
@@ -125,3 +145,8 @@ cpack_add_component(dev GROUP libraries)
 cpack_add_component(dev-system GROUP libraries)
 cpack_add_component_group(edge)
 cpack_add_component_group(libraries)
+if(TARGET alidade-simulate)
+  cpack_add_component(virtual GROUP simulator)
+  cpack_add_component(virtual-system GROUP simulator)
+  cpack_add_component_group(simulator)
+endif()

@@ -14,6 +14,7 @@
 #include "edge_app/commands/calibrate_shutter.h"
 #include "edge_app/commands/check.h"
 #include "edge_app/commands/command.h"
+#include "edge_app/commands/discover.h"
 #include "edge_app/commands/live_pattern.h"
 #include "edge_app/commands/localize.h"
 #include "edge_app/commands/log.h"
@@ -25,23 +26,95 @@
 #include "edge_app/commands/record.h"
 #include "edge_app/commands/replay.h"
 #include "edge_app/commands/run.h"
+#include "edge_app/commands/setup.h"
 #include "edge_app/commands/verify.h"
 #include "edge_app/config/nearest_word.h"
 
 namespace alidade {
 namespace {
 
+void add_discover(CLI::App& app, int* exit_code) {
+  auto options = std::make_shared<DiscoverOptions>();
+  CLI::App* command = app.add_subcommand(
+      "discover", "Find cameras, on the network and on this machine; writes a configuration");
+  command
+      ->add_option(
+          "--device", options->device,
+          "The camera that is meant: its address (192.0.2.10, http://192.0.2.10:8080, also "
+          "one that the search does not reach), or /dev/video0 (default: the only one)")
+      ->type_name("DEVICE");
+  CLI::Option* user = command->add_option(
+      "--user", options->user, "Log in at that camera; its password is asked for without echo");
+  command
+      ->add_option("--password-file", options->password_file,
+                   "A file whose first line is the password, in place of the question")
+      ->needs(user);
+  CLI::Option* write = command->add_option(
+      "--write", options->write,
+      "Try the camera and write its configuration; the password goes to a file of its own beside "
+      "it, for its owner only");
+  command
+      ->add_option("--field-of-view", options->field_of_view,
+                   "Of the lens, horizontally, from the data sheet; WIDE:TELE of one that zooms")
+      ->type_name("DEG")
+      ->needs(write);
+  command
+      ->add_option("--head", options->head,
+                   "A head of its own in place of the camera's telemetry, TYPE:ADDRESS: "
+                   "pelco_d:/dev/ttyUSB0, ptu:tcp://192.0.2.7:4000")
+      ->type_name("HEAD")
+      ->needs(write);
+  command
+      ->add_option("--set", options->keys,
+                   "A key of the configuration: SECTION.KEY=VALUE, as pan_tilt.pan_positive=left; "
+                   "may be given several times")
+      ->type_name("KEY")
+      ->allow_extra_args(false)
+      ->needs(write);
+  command->add_flag("--untried", options->untried, "Write it without trying video and telemetry")
+      ->needs(write);
+  command->add_option("--interface", options->interface,
+                      "Search on this network interface only (default: on all)");
+  command
+      ->add_option("--duration", options->duration_s,
+                   "Seconds to search the network for; 0: not at all")
+      ->check(CLI::Range(0.0, 600.0))
+      ->capture_default_str();
+  command->add_flag("--json", options->json, "What was found on stdout as one line of JSON");
+  command->callback([options, exit_code] { *exit_code = discover_cameras(*options); });
+}
+
+void add_setup(CLI::App& app, int* exit_code) {
+  auto options = std::make_shared<SetupOptions>();
+  CLI::App* command = app.add_subcommand(
+      "setup",
+      "The same as a page in the browser, on this machine or by ssh; writes a configuration");
+  command->add_option("--write", options->write, "The configuration to write")
+      ->capture_default_str();
+  command->add_option("--port", options->port, "Port on 127.0.0.1; 0: any free one")
+      ->check(CLI::Range(0, 65535))
+      ->capture_default_str();
+  command->callback([options, exit_code] { *exit_code = set_up_in_browser(*options); });
+}
+
+constexpr const char* kNoConfiguration =
+    "-c is missing: the configuration. To make one: alidade setup (in a browser), or alidade "
+    "discover --write camera.yaml";
+
 void add_run(CLI::App& app, int* exit_code) {
   auto options = std::make_shared<RunOptions>();
   CLI::App* command =
       app.add_subcommand("run", "Live: an orientation for each video frame, on stdout");
-  command->add_option("-c,--config", options->config, "Configuration (YAML)")->required();
+  command->add_option("-c,--config", options->config, "Configuration (YAML), required");
   command->add_option("--duration", options->duration_s, "End after so many seconds")
       ->check(is_duration);
   CLI::Option* json =
       command->add_flag("--json", options->json, "JSON Lines, whatever the configuration says");
   command->add_flag("--csv", options->csv, "CSV, whatever the configuration says")->excludes(json);
-  command->callback([options, exit_code] { *exit_code = run_live(*options); });
+  command->callback([options, exit_code] {
+    if (options->config.empty()) throw CommandError(kExitUsage, kNoConfiguration);
+    *exit_code = run_live(*options);
+  });
 }
 
 void add_record(CLI::App& app, int* exit_code) {
@@ -410,6 +483,8 @@ int run_command_line(int argc, char** argv) {
   app.require_subcommand(1);
   app.fallthrough();  // allows --version after a sub-command
   int exit_code = kExitOk;
+  add_discover(app, &exit_code);
+  add_setup(app, &exit_code);
   add_run(app, &exit_code);
   add_record(app, &exit_code);
   add_replay(app, &exit_code);

@@ -44,16 +44,27 @@ std::string required_url(YamlSection& section, const std::string& example,
                             "; expected for example " + example);
   }
   if (rest.substr(0, rest.find('/')).find('@') != std::string::npos) {
-    section.fail("url", "holds a user or password; give them as user and password_env");
+    section.fail("url",
+                 "holds a user or password; give them as user and password_env or password_file");
   }
   return url;
 }
 
-void read_login(YamlSection& section, std::string* user, std::string* password) {
+void read_login(YamlSection& section, const std::string& config_path, std::string* user,
+                std::string* password) {
   *user = section.text("user").value_or("");
   const std::optional<std::string> variable = section.text("password_env");
-  if (!variable) return;
-  if (user->empty()) section.fail("password_env", "is given without a user; add user");
+  const std::optional<std::string> file = section.text("password_file");
+  if (!variable && !file) return;
+  if (user->empty())
+    section.fail(file ? "password_file" : "password_env", "is given without a user; add user");
+  if (variable && file)
+    section.fail("password_file", "and password_env exclude each other; keep one");
+  if (file) {
+    *password =
+        first_line_of(section, "password_file", path_relative_to(config_path, *file), "password");
+    return;
+  }
   const char* value = std::getenv(variable->c_str());
   if (value == nullptr) {
     section.fail("password_env",

@@ -26,9 +26,11 @@ inline constexpr NumberRange kSeconds{0.1, 3600, "s"};
 [[nodiscard]] std::string required_url(YamlSection& section, const std::string& example,
                                        const std::vector<std::string>& schemes);
 
-// The keys user and password_env (the environment variable that holds the password). Both may be
-// missing. password_env without user, or without such a variable, is an error.
-void read_login(YamlSection& section, std::string* user, std::string* password);
+// The keys user, password_env (the environment variable that holds the password) and password_file
+// (a file whose first line it is; relative to the configuration's folder). All may be missing. A
+// password without user, both kinds of it, no such variable or no such file are errors.
+void read_login(YamlSection& section, const std::string& config_path, std::string* user,
+                std::string* password);
 
 // The keys follow_redirects and auth.
 [[nodiscard]] LinkRules read_link_rules(YamlSection& section);

@@ -68,14 +68,7 @@ MqttOptions read_mqtt(YamlSection section, const std::string& config_path,
   MqttOptions mqtt;
   read_broker(section, &mqtt);
   read_tls_files(section, config_path, &mqtt);
-  read_login(section, &mqtt.user, &mqtt.password);
-  if (const auto file = section.text("password_file")) {
-    if (mqtt.user.empty()) section.fail("password_file", "is given without a user; add user");
-    if (section.has("password_env"))
-      section.fail("password_file", "and password_env exclude each other; keep one");
-    mqtt.password =
-        first_line_of(section, "password_file", path_relative_to(config_path, *file), "password");
-  }
+  read_login(section, config_path, &mqtt.user, &mqtt.password);
   if (!mqtt.password.empty() && !mqtt.tls && !is_loopback(mqtt.host)) {
     warnings->push_back(section.where("url") +
                         ": the password crosses the network unencrypted; use mqtts://");

@@ -100,9 +100,10 @@ PanTiltType read_pan_tilt_type(YamlSection& section) {
 }
 
 // The keys of all devices that are polled over HTTP.
-void read_http_device(YamlSection& section, PanTiltConfig* pan_tilt) {
+void read_http_device(YamlSection& section, const std::string& config_path,
+                      PanTiltConfig* pan_tilt) {
   pan_tilt->url = required_url(section, "http://camera", {"http://", "https://"});
-  read_login(section, &pan_tilt->user, &pan_tilt->password);
+  read_login(section, config_path, &pan_tilt->user, &pan_tilt->password);
   pan_tilt->rules = read_link_rules(section);
 }
 
@@ -112,14 +113,14 @@ void read_device(YamlSection& section, const PanTiltType& type, const std::strin
   constexpr NumberRange kRate{0.1, 1000, "Hz"};
   switch (type.type) {
     case PanTiltConfig::Type::kVapix:
-      read_http_device(section, pan_tilt);
+      read_http_device(section, path, pan_tilt);
       pan_tilt->camera =
           section.integer("camera", {1, 64, "camera number"}).value_or(pan_tilt->camera);
       pan_tilt->rate_hz = section.number("rate_hz", kRate).value_or(pan_tilt->rate_hz);
       pan_tilt->axes = read_axes(section, kRightAndUp);
       return;
     case PanTiltConfig::Type::kOnvif:
-      read_http_device(section, pan_tilt);
+      read_http_device(section, path, pan_tilt);
       read_onvif(section, pan_tilt);
       pan_tilt->rate_hz = section.number("rate_hz", kRate).value_or(pan_tilt->rate_hz);
       pan_tilt->axes = read_axes(section, kRightAndUp);

@@ -15,7 +15,7 @@ using Read = void (*)(YamlSection& section, const std::string& config_path, Vide
 
 void read_rtsp(YamlSection& section, const std::string& config_path, VideoConfig* video) {
   video->url = required_url(section, "rtsp://camera/stream", {"rtsp://", "rtsps://"});
-  read_login(section, &video->user, &video->password);
+  read_login(section, config_path, &video->user, &video->password);
   video->rules = read_link_rules(section);
   const bool by_tls = is_by_tls(video->url);
   if (section.choice("transport", {"tcp", "udp"}).value_or("tcp") == "udp") {
@@ -40,9 +40,9 @@ void read_rtp(YamlSection& section, const std::string& config_path, VideoConfig*
   }
 }
 
-void read_mjpeg(YamlSection& section, const std::string&, VideoConfig* video) {
+void read_mjpeg(YamlSection& section, const std::string& config_path, VideoConfig* video) {
   video->url = required_url(section, "http://camera/mjpg/video.mjpg", {"http://", "https://"});
-  read_login(section, &video->user, &video->password);
+  read_login(section, config_path, &video->user, &video->password);
   video->rules = read_link_rules(section);
 }
 

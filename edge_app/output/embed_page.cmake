@@ -1,10 +1,11 @@
-# cmake -DPAGE=page "-DMODULES=numbers;...;main" -DSOURCE=status_page_text.cpp -P embed_page.cmake
+# cmake -DPAGE=page -DNAME=status_page -DSTYLE=style.css "-DMODULES=numbers;...;main" -DHEADER=edge_app/output/status_page.h
+#       -DPOLICY=kStatusPagePolicy -DSOURCE=status_page_text.cpp -P embed_page.cmake
 # Joins the files of the folder `page` into one page and writes it into a C++ source, together with a
 # Content-Security-Policy. The policy allows the page's style and script by their SHA-256, and nothing
 # from elsewhere. The modules become one script, in their order, without imports and exports.
 cmake_minimum_required(VERSION 3.16)
-file(READ "${PAGE}/status_page.html" page)
-file(READ "${PAGE}/style.css" style)
+file(READ "${PAGE}/${NAME}.html" page)
+file(READ "${STYLE}" style)
 set(style "\n${style}")
 
 set(script "\n'use strict';\n")
@@ -21,7 +22,7 @@ function(replace_line line text)
   string(FIND "${page}" "${line}" first)
   string(FIND "${page}" "${line}" last REVERSE)
   if(first EQUAL -1 OR NOT first EQUAL last)
-    message(FATAL_ERROR "${PAGE}/status_page.html: should have ${line} once")
+    message(FATAL_ERROR "${PAGE}/${NAME}.html: should have ${line} once")
   endif()
   string(REPLACE "${line}" "${text}" page "${page}")
   set(page "${page}" PARENT_SCOPE)
@@ -65,13 +66,13 @@ while(NOT page STREQUAL "")
   string(APPEND pieces "  text += R\"page(${piece})page\";\n")
 endwhile()
 
-file(WRITE "${SOURCE}" "#include \"edge_app/output/status_page.h\"
+file(WRITE "${SOURCE}" "#include \"${HEADER}\"
 
 namespace alidade {
 
-const char* const kStatusPagePolicy = R\"page(${policy})page\";
+const char* const ${POLICY} = R\"page(${policy})page\";
 
-std::string status_page_text() {
+std::string ${NAME}_text() {
   std::string text;
 ${pieces}  return text;
 }

@@ -12,6 +12,7 @@
 #include <pugixml.hpp>
 
 #include "platform/pan_tilt/onvif_time.h"
+#include "platform/pan_tilt/onvif_xml.h"
 #include "platform/system/shown.h"
 #include "platform/system/text.h"
 
@@ -21,52 +22,6 @@ namespace {
 constexpr std::size_t kShown = 120;  // bytes of foreign text quoted in an error
 constexpr const char* kWss = "http://docs.oasis-open.org/wss/2004/01/oasis-200401-wss-";
 
-// --- text
-
-std::string xml_escaped(std::string_view text) {
-  std::string xml;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        xml += "&amp;";
-        break;
-      case '<':
-        xml += "&lt;";
-        break;
-      case '>':
-        xml += "&gt;";
-        break;
-      default:
-        xml += c;
-    }
-  }
-  return xml;
-}
-
-// --- XML
-
-std::string_view local_name(const char* name) {
-  const std::string_view text(name);
-  const std::size_t colon = text.find(':');
-  return colon == std::string_view::npos ? text : text.substr(colon + 1);
-}
-
-pugi::xml_node child(const pugi::xml_node& node, std::string_view name) {
-  return node.find_child(
-      [name](const pugi::xml_node& candidate) { return local_name(candidate.name()) == name; });
-}
-
-pugi::xml_node descendant(pugi::xml_node node, std::initializer_list<std::string_view> names) {
-  for (const std::string_view name : names) {
-    node = child(node, name);
-  }
-  return node;
-}
-
-std::string text_of(const pugi::xml_node& node) {
-  return std::string(trimmed(node.child_value(), kXmlBlanks));
-}
-
 std::optional<double> attribute(const pugi::xml_node& node, const char* name) {
   return parse_number(trimmed(node.attribute(name).value(), kXmlBlanks));
 }
@@ -75,14 +30,14 @@ pugi::xml_node load_body(std::string_view bytes, pugi::xml_document* document) {
   if (!document->load_buffer(bytes.data(), bytes.size())) {
     return {};
   }
-  return descendant(document->root(), {"Envelope", "Body"});
+  return xml_descendant(document->root(), {"Envelope", "Body"});
 }
 
 // The element that answers `call`. If it is missing: a null node and *error.
 pugi::xml_node load_answer(std::string_view bytes, const OnvifCall& call,
                            pugi::xml_document* document, std::string* error) {
   const pugi::xml_node answer =
-      child(load_body(bytes, document), std::string(call.name) + "Response");
+      xml_child(load_body(bytes, document), std::string(call.name) + "Response");
   if (!answer) {
     *error = std::string("no answer to ") + call.name + " in '" +
              shown(trimmed(bytes.substr(0, bytes.find('\n')), kXmlBlanks), kShown) +
@@ -96,7 +51,7 @@ std::optional<double> civil_time(const pugi::xml_node& node) {
   bool whole = true;
   const auto number = [&](const char* part, const char* name) {
     const std::optional<double> value =
-        parse_number(trimmed(descendant(node, {part, name}).child_value(), kXmlBlanks));
+        parse_number(trimmed(xml_descendant(node, {part, name}).child_value(), kXmlBlanks));
     whole = whole && value && std::abs(*value) < 1e4;
     return whole ? static_cast<int>(*value) : 0;
   };
@@ -112,7 +67,9 @@ std::optional<double> civil_time(const pugi::xml_node& node) {
 
 // <Min/><Max/>; nullopt unless both are there.
 std::optional<OnvifInterval> interval(const pugi::xml_node& node) {
-  const auto end = [&node](const char* name) { return parse_number(text_of(child(node, name))); };
+  const auto end = [&node](const char* name) {
+    return parse_number(xml_text(xml_child(node, name)));
+  };
   const std::optional<double> low = end("Min");
   const std::optional<double> high = end("Max");
   return low && high ? std::optional(OnvifInterval{*low, *high}) : std::nullopt;
@@ -120,9 +77,9 @@ std::optional<OnvifInterval> interval(const pugi::xml_node& node) {
 
 void add_ranges(const pugi::xml_node& spaces, std::vector<OnvifSpaceRange>* ranges) {
   for (const pugi::xml_node& space : spaces.children()) {
-    if (local_name(space.name()) == "AbsolutePanTiltPositionSpace") {
-      ranges->push_back({text_of(child(space, "URI")), interval(child(space, "XRange")),
-                         interval(child(space, "YRange"))});
+    if (xml_local_name(space.name()) == "AbsolutePanTiltPositionSpace") {
+      ranges->push_back({xml_text(xml_child(space, "URI")), interval(xml_child(space, "XRange")),
+                         interval(xml_child(space, "YRange"))});
     }
   }
 }
@@ -193,6 +150,12 @@ std::string onvif_request(const OnvifCall& call, const std::string& token,
   } else if (name == kGetServices.name) {
     content = "<IncludeCapability>false</IncludeCapability>";
   }
+  return onvif_envelope(call, content, login);
+}
+
+std::string onvif_envelope(const OnvifCall& call, const std::string& content,
+                           const std::optional<OnvifLogin>& login) {
+  const std::string name(call.name);
   return "<?xml version=\"1.0\" encoding=\"UTF-8\"?>"
          "<s:Envelope xmlns:s=\"http://www.w3.org/2003/05/soap-envelope\">" +
          (login ? security_header(*login) : std::string()) + "<s:Body><" + name + " xmlns=\"" +
@@ -206,22 +169,22 @@ std::string onvif_content_type(const OnvifCall& call) {
 
 std::optional<SoapFault> parse_soap_fault(std::string_view body) {
   pugi::xml_document document;
-  const pugi::xml_node fault = child(load_body(body, &document), "Fault");
+  const pugi::xml_node fault = xml_child(load_body(body, &document), "Fault");
   if (!fault) {
     return std::nullopt;
   }
   // The innermost code is the most specific. SOAP 1.1 has faultcode and faultstring instead.
   constexpr int kDepth = 5;
-  pugi::xml_node code = child(fault, "Code");
-  for (int depth = 0; depth < kDepth && child(code, "Subcode"); ++depth) {
-    code = child(code, "Subcode");
+  pugi::xml_node code = xml_child(fault, "Code");
+  for (int depth = 0; depth < kDepth && xml_child(code, "Subcode"); ++depth) {
+    code = xml_child(code, "Subcode");
   }
-  std::string what = text_of(child(code, "Value"));
-  std::string reason = text_of(descendant(fault, {"Reason", "Text"}));
-  what = what.empty() ? text_of(child(fault, "faultcode")) : what;
-  reason = reason.empty() ? text_of(child(fault, "faultstring")) : reason;
+  std::string what = xml_text(xml_child(code, "Value"));
+  std::string reason = xml_text(xml_descendant(fault, {"Reason", "Text"}));
+  what = what.empty() ? xml_text(xml_child(fault, "faultcode")) : what;
+  reason = reason.empty() ? xml_text(xml_child(fault, "faultstring")) : reason;
   SoapFault result;
-  const std::string_view local = local_name(what.c_str());
+  const std::string_view local = xml_local_name(what.c_str());
   result.not_authorized = is_of_login(local) || names_login(reason);
   result.of_a_service = !result.not_authorized && is_of_a_service(local);
   result.text = shown(what + (reason.empty() ? "" : ": " + reason), kShown);
@@ -240,9 +203,9 @@ bool parse_onvif_clock(std::string_view body, OnvifClock* clock, std::string* er
   if (!answer) {
     return false;
   }
-  const pugi::xml_node told = child(answer, "SystemDateAndTime");
-  clock->utc_s = civil_time(child(told, "UTCDateTime"));
-  clock->local_s = civil_time(child(told, "LocalDateTime"));
+  const pugi::xml_node told = xml_child(answer, "SystemDateAndTime");
+  clock->utc_s = civil_time(xml_child(told, "UTCDateTime"));
+  clock->local_s = civil_time(xml_child(told, "LocalDateTime"));
   if (!clock->utc_s && !clock->local_s) {
     *error = "neither UTCDateTime nor LocalDateTime in the answer to GetSystemDateAndTime";
     return false;
@@ -255,18 +218,18 @@ bool parse_onvif_services(std::string_view body, OnvifServices* services, std::s
   *services = {};
   if (const pugi::xml_node listed = load_answer(body, kGetServices, &document, error)) {
     for (const pugi::xml_node& service : listed.children()) {
-      const std::string name = text_of(child(service, "Namespace"));
+      const std::string name = xml_text(xml_child(service, "Namespace"));
       std::string* const address = name == kOnvifPtz     ? &services->ptz
                                    : name == kOnvifMedia ? &services->media
                                                          : nullptr;
       if (address != nullptr) {
-        *address = text_of(child(service, "XAddr"));
+        *address = xml_text(xml_child(service, "XAddr"));
       }
     }
   } else if (const pugi::xml_node answer = load_answer(body, kGetCapabilities, &document, error)) {
-    const pugi::xml_node capabilities = child(answer, "Capabilities");
-    services->ptz = text_of(descendant(capabilities, {"PTZ", "XAddr"}));
-    services->media = text_of(descendant(capabilities, {"Media", "XAddr"}));
+    const pugi::xml_node capabilities = xml_child(answer, "Capabilities");
+    services->ptz = xml_text(xml_descendant(capabilities, {"PTZ", "XAddr"}));
+    services->media = xml_text(xml_descendant(capabilities, {"Media", "XAddr"}));
   } else {
     return false;
   }
@@ -284,11 +247,12 @@ bool parse_onvif_profile(std::string_view body, OnvifProfile* profile, std::stri
     return false;
   }
   for (const pugi::xml_node& candidate : answer.children()) {
-    const pugi::xml_node configuration = child(candidate, "PTZConfiguration");
+    const pugi::xml_node configuration = xml_child(candidate, "PTZConfiguration");
     profile->token = candidate.attribute("token").value();
-    if (local_name(candidate.name()) == "Profiles" && !profile->token.empty() && configuration) {
+    if (xml_local_name(candidate.name()) == "Profiles" && !profile->token.empty() &&
+        configuration) {
       profile->configuration = configuration.attribute("token").value();
-      profile->node = text_of(child(configuration, "NodeToken"));
+      profile->node = xml_text(xml_child(configuration, "NodeToken"));
       return true;
     }
   }
@@ -310,12 +274,12 @@ bool parse_onvif_ranges(std::string_view body, const std::string& node,
     }
     for (const pugi::xml_node& candidate : nodes.children()) {
       if (!mine || candidate == mine) {
-        add_ranges(child(candidate, "SupportedPTZSpaces"), ranges);
+        add_ranges(xml_child(candidate, "SupportedPTZSpaces"), ranges);
       }
     }
   } else if (const pugi::xml_node options =
                  load_answer(body, kGetConfigurationOptions, &document, error)) {
-    add_ranges(descendant(options, {"PTZConfigurationOptions", "Spaces"}), ranges);
+    add_ranges(xml_descendant(options, {"PTZConfigurationOptions", "Spaces"}), ranges);
   } else {
     return false;
   }
@@ -331,8 +295,8 @@ bool parse_onvif_status(std::string_view body, OnvifStatus* status, std::string*
   if (!answer) {
     return false;
   }
-  const pugi::xml_node whole = child(answer, "PTZStatus");
-  const pugi::xml_node pan_tilt = descendant(whole, {"Position", "PanTilt"});
+  const pugi::xml_node whole = xml_child(answer, "PTZStatus");
+  const pugi::xml_node pan_tilt = xml_descendant(whole, {"Position", "PanTilt"});
   const std::optional<double> pan = attribute(pan_tilt, "x");
   const std::optional<double> tilt = attribute(pan_tilt, "y");
   if (!pan || !tilt) {
@@ -343,8 +307,8 @@ bool parse_onvif_status(std::string_view body, OnvifStatus* status, std::string*
   status->pan = *pan;
   status->tilt = *tilt;
   status->space = pan_tilt.attribute("space").value();
-  status->zoom = attribute(descendant(whole, {"Position", "Zoom"}), "x");
-  status->utc_s = parse_xml_time(child(whole, "UtcTime").child_value());
+  status->zoom = attribute(xml_descendant(whole, {"Position", "Zoom"}), "x");
+  status->utc_s = parse_xml_time(xml_child(whole, "UtcTime").child_value());
   return true;
 }
 

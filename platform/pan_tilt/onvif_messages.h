@@ -42,6 +42,10 @@ constexpr OnvifCall kGetConfigurationOptions{kOnvifPtz, "GetConfigurationOptions
 [[nodiscard]] std::string onvif_request(const OnvifCall& call, const std::string& token,
                                         const std::optional<OnvifLogin>& login);
 
+// The same for any call; content: the XML inside its element.
+[[nodiscard]] std::string onvif_envelope(const OnvifCall& call, const std::string& content,
+                                         const std::optional<OnvifLogin>& login);
+
 // "Content-Type: ..." of this envelope.
 [[nodiscard]] std::string onvif_content_type(const OnvifCall& call);
 

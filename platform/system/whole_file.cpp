@@ -38,10 +38,10 @@ class TemporaryFile {
   }
 
   // On false the reason is in errno.
-  bool replace(const std::string& target, const std::string& content) {
+  bool replace(const std::string& target, const std::string& content, mode_t mode) {
     if (descriptor_ < 0 || !write_all(descriptor_, content)) return false;
-    // mkostemp lets only the owner read the file; what is stored here is no secret.
-    renamed_ = ::fchmod(descriptor_, 0644) == 0 && ::fsync(descriptor_) == 0 &&
+    // Until then only the owner can read the file: mkostemp sees to that.
+    renamed_ = ::fchmod(descriptor_, mode) == 0 && ::fsync(descriptor_) == 0 &&
                ::rename(name_.c_str(), target.c_str()) == 0;
     return renamed_;
   }
@@ -86,12 +86,12 @@ void sync_folder_of(const std::string& path) {
 
 }  // namespace
 
-bool write_file_atomically(const std::string& path, const std::string& content,
-                           std::string* error) {
+bool write_file_atomically(const std::string& path, const std::string& content, std::string* error,
+                           unsigned mode) {
   const std::string own = std::filesystem::path(path).filename().string();
   remove_unfinished(folder_of(path), [&own](const std::string& name) { return name == own; });
   TemporaryFile file(path);
-  if (!file.replace(path, content)) {
+  if (!file.replace(path, content, mode)) {
     *error = path + ": cannot be written: " + std::strerror(errno);
     return false;
   }

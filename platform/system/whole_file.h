@@ -16,9 +16,12 @@
 namespace alidade {
 
 // First removes unfinished files that killed processes left of this file. On false the old file
-// stays, nothing unfinished is left, and *error is `path: cannot be written: why`.
+// stays, nothing unfinished is left, and *error is `path: cannot be written: why`. mode: who may
+// read and write it.
+inline constexpr unsigned kForAllToRead = 0644;
+inline constexpr unsigned kForTheOwnerOnly = 0600;
 [[nodiscard]] bool write_file_atomically(const std::string& path, const std::string& content,
-                                         std::string* error);
+                                         std::string* error, unsigned mode = kForAllToRead);
 
 // The same last steps for a file that other code wrote beside its place: syncs `from` and renames
 // it to `to`. On false both names are as before, and *error is as above.

@@ -118,7 +118,7 @@ V4l2Device::Result V4l2Device::open(const std::string& path, const V4l2Wish& wis
   Result result = check_kind();
   std::string error;
   if (result == Result::kOk) {
-    const auto fourcc = choose_format(offers(wish), wish, &error);
+    const auto fourcc = choose_format(list_offers(wish), wish, &error);
     result = fourcc ? set_format(*fourcc, wish) : fail(Result::kUnusable, error);
   }
   if (result == Result::kOk && wish.rate_hz > 0) {
@@ -133,7 +133,22 @@ V4l2Device::Result V4l2Device::open(const std::string& path, const V4l2Wish& wis
   return result;
 }
 
-V4l2Device::Result V4l2Device::check_kind() {
+V4l2Device::Result V4l2Device::survey(const std::string& path, std::string* name,
+                                      std::vector<V4l2Offer>* offers) {
+  path_ = path;
+  device_.reset(::open(path.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC));
+  if (!device_.is_open()) {
+    return fail_call("cannot be opened", errno);
+  }
+  const Result result = check_kind(name);
+  if (result == Result::kOk) {
+    *offers = list_offers({});
+  }
+  close();
+  return result;
+}
+
+V4l2Device::Result V4l2Device::check_kind(std::string* name) {
   v4l2_capability capability{};
   if (call(device_.get(), VIDIOC_QUERYCAP, &capability) < 0) {
     return errno == ENOTTY || errno == EINVAL
@@ -144,6 +159,10 @@ V4l2Device::Result V4l2Device::check_kind() {
                                  ? capability.device_caps
                                  : capability.capabilities;
   const std::string driver(reinterpret_cast<const char*>(capability.driver));
+  constexpr std::uint32_t kCaptures = V4L2_CAP_VIDEO_CAPTURE | V4L2_CAP_VIDEO_CAPTURE_MPLANE;
+  if (name != nullptr && ((able & kCaptures) != 0 || driver == "v4l2 loopback")) {
+    *name = reinterpret_cast<const char*>(capability.card);
+  }
   if ((able & V4L2_CAP_VIDEO_CAPTURE) == 0) {
     if ((able & (V4L2_CAP_VIDEO_CAPTURE_MPLANE | V4L2_CAP_VIDEO_M2M_MPLANE)) != 0) {
       return fail(Result::kUnusable, "is a multi-planar device (driver " + driver +
@@ -205,7 +224,7 @@ std::vector<V4l2Size> V4l2Device::sizes(std::uint32_t fourcc, const V4l2Wish& wi
   return sizes;
 }
 
-std::vector<V4l2Offer> V4l2Device::offers(const V4l2Wish& wish) const {
+std::vector<V4l2Offer> V4l2Device::list_offers(const V4l2Wish& wish) const {
   std::vector<V4l2Offer> offers;
   v4l2_fmtdesc entry{};
   entry.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;

@@ -52,6 +52,10 @@ class V4l2Device : public std::enable_shared_from_this<V4l2Device> {
   // Opens, negotiates and starts streaming. Unless kOk, the device is closed again.
   [[nodiscard]] Result open(const std::string& path, const V4l2Wish& wish);
   void close();
+  // Asks a device what it is and offers, and closes it; nothing is set. *name is set if it is a
+  // capture device.
+  [[nodiscard]] Result survey(const std::string& path, std::string* name,
+                              std::vector<V4l2Offer>* offers);
 
   // Readable in poll() when a buffer is filled.
   [[nodiscard]] int fd() const { return device_.get(); }
@@ -89,8 +93,8 @@ class V4l2Device : public std::enable_shared_from_this<V4l2Device> {
     std::size_t size_;
   };
 
-  Result check_kind();
-  std::vector<V4l2Offer> offers(const V4l2Wish& wish) const;
+  Result check_kind(std::string* name = nullptr);
+  std::vector<V4l2Offer> list_offers(const V4l2Wish& wish) const;
   std::vector<V4l2Size> sizes(std::uint32_t fourcc, const V4l2Wish& wish) const;
   void add_rates(std::uint32_t fourcc, int width, int height, V4l2Size* size) const;
   Result set_format(std::uint32_t fourcc, const V4l2Wish& wish);

@@ -8,6 +8,7 @@
 
 #include "test/simulator/path.h"
 #include "test/simulator/pattern_board.h"
+#include "test/simulator/resize.h"
 #include "test/support/temporary_directory.h"
 
 namespace alidade::simulator {
@@ -243,6 +244,30 @@ TEST_F(VirtualCameraConfig, FollowsACsvPathThroughItsPointsAndAcrossHalfATurn) {
   EXPECT_NEAR(path->at(1).pan, 3.2, 1e-12);
   EXPECT_NEAR(path->at(9).pan, 3.2, 1e-12);
   EXPECT_NEAR(path->at(1).tilt, 0.1, 1e-12);
+}
+
+TEST_F(VirtualCameraConfig, AnotherSizeIsTheSameCamera) {
+  const Config before = load(
+      "image: {width: 1280, height: 720}\n"
+      "camera: {line_delay_us: -14.2, radial_distortion: 3}\n"
+      "zoom: {focal_length_px: {wide: 1200, tele: 24000}, centre_px: [4, -3], path: {type: dwell, "
+      "stops: [{focal_length_px: 2400, rest_s: 1}]}}\n"
+      "guess: {focal_length_px: 1300}\n");
+  Config config = before;
+  resize("320x180", &config);
+  EXPECT_EQ(config.image.width, 320);
+  EXPECT_EQ(config.image.height, 180);
+  EXPECT_NEAR(horizontal_field_of_view(config), horizontal_field_of_view(before), 1e-12);
+  EXPECT_DOUBLE_EQ(config.zoom->focal_length.tele, 6000);
+  EXPECT_DOUBLE_EQ(config.zoom->path.stops.at(0).focal_length.value(), 600);
+  EXPECT_DOUBLE_EQ(config.zoom->centre.x(), 1);
+  EXPECT_DOUBLE_EQ(config.guess_focal_length.value(), 325);
+  // Reading out a frame takes as long.
+  EXPECT_DOUBLE_EQ(config.camera.line_delay * 180, before.camera.line_delay * 720);
+  EXPECT_DOUBLE_EQ(config.camera.radial_distortion, 3);
+  for (const char* size : {"", "320", "320x", "x180", "0x0", "320x180x", "9999x9999"}) {
+    EXPECT_THROW(resize(size, &config), ConfigError) << size;
+  }
 }
 
 }  // namespace

@@ -222,9 +222,30 @@ struct Reading {
   double zoom_part = 0;        // 0 at the wide end, 1 at the tele end
 };
 
+const char* onvif_encoding(VideoCodec codec) {
+  switch (codec) {
+    case VideoCodec::kH264:
+      return "H264";
+    case VideoCodec::kH265:
+      return "H265";
+    case VideoCodec::kMjpeg:
+      break;
+  }
+  return "JPEG";
+}
+
 // ONVIF in its generic space: -1..1 for half a turn of pan and a quarter of tilt either way, 0..1 for the zoom.
-OnvifDevice onvif_device(const LiveConfig& live, const std::function<Reading()>& position) {
+OnvifDevice onvif_device(const Config& config, const std::string& stream_url,
+                         const std::function<Reading()>& position) {
+  const LiveConfig& live = config.live;
   OnvifDevice device;
+  device.stream_url = stream_url;
+  device.encoding = onvif_encoding(live.encoding.codec);
+  device.encoder_profile = "High";
+  device.width = config.image.width;
+  device.height = config.image.height;
+  device.rate_hz = static_cast<int>(std::lround(config.image.rate_hz));
+  device.gov_length = live.encoding.gop > 0 ? live.encoding.gop : device.rate_hz;
   device.login = live.user.empty() ? OnvifDevice::Login::kNone : OnvifDevice::Login::kToken;
   device.user = live.user;
   device.password = live.password;
@@ -290,8 +311,8 @@ void serve_live(const Config& given, const std::atomic<bool>& stop) {
     return VapixPosition{there.pan_deg, there.tilt_deg, there.zoom.value_or(1)};
   });
   start(vapix);
-  std::string ready = "ready rtsp://127.0.0.1:" + std::to_string(video.port()) +
-                      "/video http://127.0.0.1:" + std::to_string(vapix.port());
+  const std::string video_url = "rtsp://127.0.0.1:" + std::to_string(video.port()) + "/video";
+  std::string ready = "ready " + video_url + " http://127.0.0.1:" + std::to_string(vapix.port());
   std::optional<MjpegStream> mjpeg;
   if (config.live.mjpeg_port) {
     start(mjpeg.emplace(
@@ -300,7 +321,7 @@ void serve_live(const Config& given, const std::atomic<bool>& stop) {
   }
   std::optional<OnvifServer> onvif;
   if (config.live.onvif_port) {
-    onvif.emplace(onvif_device(config.live, position), *config.live.onvif_port);
+    onvif.emplace(onvif_device(config, video_url, position), *config.live.onvif_port);
     ready += " onvif=" + onvif->url();
   }
   std::optional<HeadServer> head;

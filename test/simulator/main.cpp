@@ -7,11 +7,13 @@
 #include <csignal>
 #include <cstdio>
 #include <exception>
+#include <filesystem>
 #include <string>
 
 #include "test/simulator/config.h"
 #include "test/simulator/live.h"
 #include "test/simulator/recording_writer.h"
+#include "test/simulator/resize.h"
 
 namespace {
 
@@ -25,11 +27,38 @@ void stop_on_signals() {
   sigaction(SIGTERM, &action, nullptr);
 }
 
+namespace fs = std::filesystem;
+
+// The examples of the package lie beside its program, those of a build in its source folder.
+fs::path example_file(const std::string& name) {
+  const fs::path here = fs::read_symlink("/proc/self/exe").parent_path();
+  const std::string file = name == "cheap_dome" ? "cheap_dome.yaml" : name + "_camera.yaml";
+  for (const fs::path& folder : {here / "../share/alidade-simulator/simulator/examples",
+                                 here / "../../../../test/simulator/examples"}) {
+    if (fs::exists(folder / file)) return (folder / file).lexically_normal();
+  }
+  throw alidade::simulator::ConfigError(
+      "--example: the examples are not where the program is installed; give -c FILE");
+}
+
 int run(int argc, char** argv) {
   CLI::App app("A virtual pan-tilt-zoom camera with known truth.");
   std::string config_file;
   std::string output;
-  app.add_option("-c,--config", config_file, "configuration (YAML)")->required();
+  CLI::Option* config_option =
+      app.add_option("-c,--config", config_file, "configuration (YAML); or");
+  std::string example;
+  app.add_option(
+         "--example", example,
+         "a camera that comes with the program: paper, zoom or cheap_dome; its truth goes to "
+         "the folder truth here")
+      ->check(CLI::IsMember({"paper", "zoom", "cheap_dome"}))
+      ->excludes(config_option);
+  std::string size;
+  app.add_option(
+      "--size", size,
+      "WIDTHxHEIGHT of the pictures in place of the configuration's, as 480x270: smaller "
+      "ones are rendered sooner");
   app.add_option("-o,--output", output,
                  "write a recording to this new directory; without it, serve");
   app.set_version_flag("--version", "alidade-simulate " ALIDADE_VERSION);
@@ -42,7 +71,12 @@ int run(int argc, char** argv) {
   }
 
   using namespace alidade::simulator;
-  const Config config = load_config(config_file);
+  if (config_file.empty() && example.empty())
+    throw ConfigError("a camera is missing; give -c FILE, or --example zoom");
+  Config config = load_config(example.empty() ? fs::path(config_file) : example_file(example));
+  // The folder of the examples may not be written.
+  if (!example.empty()) config.truth_dir = "truth";
+  if (!size.empty()) resize(size, &config);
   if (output.empty()) {
     stop_on_signals();
     serve_live(config, stop_requested);

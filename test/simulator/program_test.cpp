@@ -124,9 +124,15 @@ TEST(VirtualCameraProgram, PrintsItsVersionAndItsHelp) {
 
 TEST(VirtualCameraProgram, ExplainsBadUsageAndBadConfigurationWithExitCodeTwo) {
   Child no_config({});
-  EXPECT_THAT(no_config.read_line(), HasSubstr("--config is required"));
+  EXPECT_THAT(no_config.read_line(), HasSubstr("give -c FILE, or --example zoom"));
   EXPECT_EQ(no_config.read_line(), "");
   EXPECT_EQ(no_config.exit_code(), 2);
+  Child unknown_example({"--example", "mountain"});
+  EXPECT_THAT(unknown_example.read_line(), HasSubstr("cheap_dome"));
+  EXPECT_EQ(unknown_example.exit_code(), 2);
+  Child no_size({"--example", "zoom", "--size", "480"});
+  EXPECT_THAT(no_size.read_line(), HasSubstr("'480' is no size; expected WIDTHxHEIGHT"));
+  EXPECT_EQ(no_size.exit_code(), 2);
   const TemporaryDirectory directory;
   Child unknown_key({"-c", directory.write("a.yaml", "seed: 1\nsead: 2\n")});
   EXPECT_THAT(unknown_key.read_line(), HasSubstr("a.yaml:2: unknown key 'sead'"));

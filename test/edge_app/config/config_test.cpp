@@ -193,6 +193,21 @@ TEST_F(ConfigTest, ABrokersPasswordMayStandInAFileAndIsToCrossNoNetworkInTheClea
   EXPECT_THAT(config_.warnings, IsEmpty());
 }
 
+TEST_F(ConfigTest, ACamerasPasswordMayStandInAFileBesideTheConfiguration) {
+  directory_.write("password", "open-sesame\n");
+  const std::string login = ", user: eve, password_file: password}\n";
+  ASSERT_THAT(load("video: {type: rtsp, url: 'rtsp://camera/s'" + login +
+                   "pan_tilt: {type: onvif, url: 'http://camera'" + login),
+              IsEmpty());
+  EXPECT_EQ(config_.video.password, "open-sesame");
+  EXPECT_EQ(config_.pan_tilt.password, "open-sesame");
+  ASSERT_THAT(load("video: {type: mjpeg, url: 'http://camera/s'" + login +
+                   "pan_tilt: {type: vapix, url: 'http://camera'" + login),
+              IsEmpty());
+  EXPECT_EQ(config_.video.password, "open-sesame");
+  EXPECT_EQ(config_.pan_tilt.password, "open-sesame");
+}
+
 TEST_F(ConfigTest, TakesTheFocalLengthsOfALensThatZooms) {
   ASSERT_THAT(load("video: {type: rtsp, url: 'rtsp://camera/s'}\n"
                    "pan_tilt: {type: vapix, url: 'http://camera'}\n"
@@ -1045,6 +1060,16 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"PasswordWithoutUser",
                 "video: {type: rtsp, url: rtsp://c/s, password_env: HOME}\n" PAN_TILT,
                 ":1: video.password_env", "add user"},
+        Mistake{"PasswordFileOfACameraForNobody",
+                "video: {type: rtsp, url: rtsp://c/s, password_file: p}\n" PAN_TILT,
+                ":1: video.password_file", "is given without a user"},
+        Mistake{"PasswordFileOfACameraThatIsNotThere",
+                "video: {type: rtsp, url: rtsp://c/s, user: u, password_file: none}\n" PAN_TILT,
+                ":1: video.password_file", "put the password there"},
+        Mistake{"TwoPasswords",
+                "video: {type: rtsp, url: rtsp://c/s, user: u, password_file: p, password_env: "
+                "HOME}\n" PAN_TILT,
+                ":1: video.password_file", "exclude each other"},
         Mistake{"UnsetPassword",
                 "video: {type: rtsp, url: rtsp://c/s, user: u, password_env: "
                 "ALIDADE_NO_SUCH_VARIABLE}\n" PAN_TILT,

@@ -104,7 +104,36 @@ std::string OnvifServer::clock_text(const std::string& name, double offset_s) co
          ">";
 }
 
-std::string OnvifServer::answer(const std::string& call) const {
+std::string OnvifServer::profiles(bool second_media) const {
+  const auto number = [](const char* name, int value) {
+    return std::string("<tt:") + name + ">" + std::to_string(value) + "</tt:" + name + ">";
+  };
+  const std::string size = "<tt:Resolution>" + number("Width", device_.width) +
+                           number("Height", device_.height) + "</tt:Resolution>";
+  const std::string rate = "<tt:RateControl>" + number("FrameRateLimit", device_.rate_hz) +
+                           number("BitrateLimit", 4096) + "</tt:RateControl>";
+  const std::string encoding = "<tt:Encoding>" + device_.encoding + "</tt:Encoding>";
+  const std::string ptz = "token=\"p\"><tt:Name>c</tt:Name>";
+  std::string video;
+  if (!device_.stream_url.empty() && second_media) {
+    video = "<tt:VideoEncoder token=\"v\" GovLength=\"" + std::to_string(device_.gov_length) +
+            "\" Profile=\"" + device_.encoder_profile + "\">" + encoding + size + rate +
+            "</tt:VideoEncoder>";
+  } else if (!device_.stream_url.empty()) {
+    video = "<tt:VideoEncoderConfiguration token=\"v\">" + encoding + size + rate + "<tt:H264>" +
+            number("GovLength", device_.gov_length) + "<tt:H264Profile>" + device_.encoder_profile +
+            "</tt:H264Profile></tt:H264></tt:VideoEncoderConfiguration>";
+  }
+  const std::string turning =
+      "<tt:Profiles fixed=\"true\" token=\"turning&amp;1\"><tt:Name>b</tt:Name>";
+  return "<tt:Profiles token=\"fixed\"><tt:Name>a</tt:Name></tt:Profiles>" + turning +
+         (second_media
+              ? "<tt:Configurations>" + video + "<tt:PTZ " + ptz + "</tt:PTZ></tt:Configurations>"
+              : video + "<tt:PTZConfiguration " + ptz + "</tt:PTZConfiguration>") +
+         "</tt:Profiles>";
+}
+
+std::string OnvifServer::answer(const std::string& call, bool second_media) const {
   const std::string base = device_.announced_host.empty() ? "" : "http://" + device_.announced_host;
   const std::string ptz =
       device_.announced_ptz.empty() ? base + device_.ptz_path : device_.announced_ptz;
@@ -125,17 +154,25 @@ std::string OnvifServer::answer(const std::string& call) const {
         base + device_.media_path +
         "</tt:XAddr></tt:Service><tt:Service><tt:Namespace>http://www.onvif.org/ver20/ptz/wsdl"
         "</tt:Namespace><tt:XAddr>" +
-        ptz + "</tt:XAddr></tt:Service>";
+        ptz + "</tt:XAddr></tt:Service>" +
+        (device_.media2_path.empty()
+             ? ""
+             : "<tt:Service><tt:Namespace>http://www.onvif.org/ver20/media/wsdl</tt:Namespace>"
+               "<tt:XAddr>" +
+                   base + device_.media2_path + "</tt:XAddr></tt:Service>");
+  } else if (call == "GetDeviceInformation") {
+    content =
+        "<tt:Manufacturer>Alidade</tt:Manufacturer><tt:Model>Virtual PTZ</tt:Model>"
+        "<tt:FirmwareVersion>1</tt:FirmwareVersion>";
+  } else if (call == "GetStreamUri") {
+    const std::string uri = "<tt:Uri>" + device_.stream_url + "</tt:Uri>";
+    content = second_media ? uri : "<tt:MediaUri>" + uri + "</tt:MediaUri>";
   } else if (call == "GetNodes") {
     content = device_.nodes;
   } else if (call == "GetConfigurationOptions") {
     content = device_.options;
   } else if (call == "GetProfiles") {
-    content =
-        "<tt:Profiles token=\"fixed\"><tt:Name>a</tt:Name></tt:Profiles>"
-        "<tt:Profiles fixed=\"true\" token=\"turning&amp;1\"><tt:Name>b</tt:Name>"
-        "<tt:PTZConfiguration token=\"p\"><tt:Name>c</tt:Name></tt:PTZConfiguration>"
-        "</tt:Profiles>";
+    content = profiles(second_media);
   } else {
     const std::string utc = device_.utc_time();
     content = "<tt:PTZStatus><tt:Position>" + device_.position() +
@@ -170,7 +207,7 @@ void OnvifServer::serve(const httplib::Request& request, httplib::Response& resp
   const std::string authorization = request.get_header_value("Authorization");
   if (!open && device_.login == Login::kToken && !token_is_good(request.body)) {
     ++refusals;
-    ++wrong_logins;
+    wrong_logins += element(request.body, "Username").empty() ? 0 : 1;
     return reply(400, fault("ter:NotAuthorized", "Sender not authorized"));
   }
   if (!open && device_.login != Login::kToken &&
@@ -183,9 +220,14 @@ void OnvifServer::serve(const httplib::Request& request, httplib::Response& resp
   }
   const bool of_ptz =
       call == "GetStatus" || call == "GetNodes" || call == "GetConfigurationOptions";
-  const std::string where = call == "GetProfiles" ? device_.media_path
-                            : of_ptz              ? device_.ptz_path
-                                                  : device_.device_path;
+  const bool of_media = call == "GetProfiles" || call == "GetStreamUri";
+  const bool second_media =
+      of_media && !device_.media2_path.empty() &&
+      request.body.find("http://www.onvif.org/ver20/media") != std::string::npos;
+  const std::string where = second_media ? device_.media2_path
+                            : of_media   ? device_.media_path
+                            : of_ptz     ? device_.ptz_path
+                                         : device_.device_path;
   if (call == "GetNodes" && device_.silent_about_nodes) {
     response.status = 200;
     response.set_content_provider(
@@ -214,7 +256,7 @@ void OnvifServer::serve(const httplib::Request& request, httplib::Response& resp
     response.set_content("<html>busy</html>", "text/html");
     return;
   }
-  reply(200, answer(call));
+  reply(200, answer(call, second_media));
 }
 
 }  // namespace alidade

@@ -39,6 +39,13 @@ struct OnvifDevice {
   std::string
       nodes;  // contents of the answers to GetNodes and GetConfigurationOptions; empty: a fault
   std::string options;
+  // What the profile with pan and tilt says of its video. stream_url empty: it has none. With
+  // media2_path the device has that service, too.
+  std::string stream_url;
+  std::string encoding = "H264";
+  std::string encoder_profile = "Baseline";
+  int width = 1280, height = 720, rate_hz = 25, gov_length = 25;
+  std::string media2_path;
   bool silent_about_nodes = false;                                       // hangs up
   std::function<std::string()> utc_time = [] { return std::string(); };  // empty: none
 };
@@ -71,7 +78,8 @@ class OnvifServer {
  private:
   void serve(const httplib::Request& request, httplib::Response& response);
   bool token_is_good(const std::string& body);
-  std::string answer(const std::string& call) const;
+  std::string answer(const std::string& call, bool second_media) const;
+  std::string profiles(bool second_media) const;
   std::string clock_text(const std::string& name, double offset_s) const;
   std::string fault(const std::string& code, const std::string& reason) const;
 
