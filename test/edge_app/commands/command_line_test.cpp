@@ -186,7 +186,8 @@ TEST(CommandLine, NamesWhatWasMistypedAndWhatIsNearest) {
            Slip{{"rnu"}, "unknown command 'rnu'; did you mean run?; see alidade --help"},
            Slip{{"chekc", "-c", "x"}, "unknown command 'chekc'; did you mean check?; see"},
            Slip{{"fly"},
-                "unknown command 'fly'; expected one of discover, setup, run, record, replay, verify, "
+                "unknown command 'fly'; expected one of discover, setup, run, record, replay, "
+                "verify, "
                 "calibrate, calibrate-shutter, plane, check, map, localize; see alidade --help"},
            Slip{{"run", "--confg", "x"},
                 "unknown option '--confg'; did you mean --config?; see alidade run --help"},
