@@ -1,5 +1,6 @@
-// `alidade discover`: which cameras there are, on the network and on this machine; what each offers;
-// and a configuration for one of them. The report goes to stdout, questions to the terminal.
+// `alidade discover`: which cameras there are, on the network and on this machine; what each
+// offers; and a configuration for one of them. The report goes to stdout, questions to the
+// terminal.
 
 #include "edge_app/commands/discover.h"
 

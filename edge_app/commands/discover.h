@@ -1,5 +1,6 @@
 #pragma once
-// `alidade discover`. The command line (command_line.cpp) names the options as here and checks them.
+// `alidade discover`. The command line (command_line.cpp) names the options as here and checks
+// them.
 
 #include <string>
 #include <vector>

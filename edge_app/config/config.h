@@ -3,10 +3,10 @@
 //
 // Each value has the same unit here as in the file. A key that the file leaves out takes the
 // default below. A key without a default (types, addresses) is required. Passwords stand in the
-// environment (`password_env` names the variable) or in a file of their own (`password_file`), never
-// in this file. Relative paths start at the
-// file's folder. Reading touches this file, the environment, and the files of secrets and
-// certificates that the file names. It tries no connection.
+// environment (`password_env` names the variable) or in a file of their own (`password_file`),
+// never in this file. Relative paths start at the file's folder. Reading touches this file, the
+// environment, and the files of secrets and certificates that the file names. It tries no
+// connection.
 
 #include <optional>
 #include <string>

@@ -70,8 +70,8 @@ std::vector<DnsRecord> records_of(ns_msg* message) {
     for (int i = 0; i < count; ++i) {
       ns_rr record{};
       if (ns_parserr(message, section, i, &record) != 0) return records;
-      records.push_back(
-          {ns_rr_name(record), ns_rr_type(record), ns_rr_rdata(record), ns_rr_rdlen(record)});
+      records.push_back({ns_rr_name(record), ns_rr_type(record), ns_rr_rdata(record),
+                         static_cast<std::size_t>(ns_rr_rdlen(record))});
     }
   }
   return records;

@@ -1,8 +1,9 @@
 #pragma once
 // DNS-SD over multicast DNS (RFC 6763, 6762): the question "who offers this service?" to
 // 224.0.0.251 and ff02::fb, port 5353, and the answers. It is asked from a port of our own, so that
-// devices answer to that port alone (RFC 6762, 6.7) and a resolver of this machine is not disturbed.
-// libresolv takes the messages apart. No side effects: bytes in, values or a one-line error out.
+// devices answer to that port alone (RFC 6762, 6.7) and a resolver of this machine is not
+// disturbed. libresolv takes the messages apart. No side effects: bytes in, values or a one-line
+// error out.
 
 #include <cstdint>
 #include <string>

@@ -5,7 +5,8 @@
 //
 // Which of the reported URLs is best: one whose host is the address that the answer came from; then
 // IPv4, a name, IPv4 of 169.254, IPv6; of the same kind http before https, whose certificate
-// cameras sign themselves. A link-local IPv6 address needs the interface behind it: [fe80::1%25eth0].
+// cameras sign themselves. A link-local IPv6 address needs the interface behind it:
+// [fe80::1%25eth0].
 
 #include <cstddef>
 #include <string>

@@ -1,8 +1,8 @@
 #pragma once
 // inquire_onvif(): asks an ONVIF device what it is, which video streams it offers, and whether it
 // has pan and tilt. Blocks: up to a dozen requests, each within timeout_s. Login as in
-// onvif_login.h: by WS-UsernameToken on the device's clock, or HTTP digest if it is offered; at most
-// three ways, as devices lock a user out. The login goes only to the host and port of `url`.
+// onvif_login.h: by WS-UsernameToken on the device's clock, or HTTP digest if it is offered; at
+// most three ways, as devices lock a user out. The login goes only to the host and port of `url`.
 
 #include <string>
 

@@ -118,9 +118,11 @@ bool parse_probe_matches(std::string_view datagram, const std::vector<std::strin
     return false;
   }
   const pugi::xml_node envelope = xml_child(document.root(), "Envelope");
-  const pugi::xml_node answers = xml_descendant(envelope, {"Body", "ProbeMatches"});
+  const pugi::xml_node body = xml_child(envelope, "Body");
+  pugi::xml_node answers = xml_child(body, "ProbeMatches");
+  // Some put their only match straight into the body.
+  if (!answers && xml_child(body, "ProbeMatch")) answers = body;
   if (!answers) {
-    const pugi::xml_node body = xml_child(envelope, "Body");
     *error = "an answer without ProbeMatches" +
              (body.first_child() ? ", but with '" + shown(body.first_child().name()) + "'"
                                  : std::string());

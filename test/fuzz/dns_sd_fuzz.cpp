@@ -1,5 +1,6 @@
-// Any datagram taken for an answer of DNS-SD. The first two bytes are those of the question's id. What
-// is read is bounded; what is not read says why in one line; the URL that is asked is http at a host.
+// Any datagram taken for an answer of DNS-SD. The first two bytes are those of the question's id.
+// What is read is bounded; what is not read says why in one line; the URL that is asked is http at
+// a host.
 
 #include "platform/discovery/dns_sd.h"
 #include "platform/discovery/found_devices.h"

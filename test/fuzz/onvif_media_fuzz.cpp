@@ -1,5 +1,6 @@
-// One body of bytes read as every answer of ONVIF about a device and its streams. Numbers are within
-// their bounds, a stream's URL leads to the device's own host, and no user or password is in it.
+// One body of bytes read as every answer of ONVIF about a device and its streams. Numbers are
+// within their bounds, a stream's URL leads to the device's own host, and no user or password is in
+// it.
 
 #include "edge_app/setup/stream_choice.h"
 #include "platform/discovery/onvif_inquiry.h"

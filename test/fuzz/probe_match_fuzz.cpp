@@ -1,5 +1,5 @@
-// Any datagram taken for an answer of WS-Discovery. What is read is bounded, what is not read says why
-// in one line, and the URL that is asked is http at a host, on the network that the answer came from.
+// Any datagram taken for an answer of WS-Discovery. What is read is bounded, what is not read says
+// why in one line, and the URL that is asked is http at a host.
 
 #include "platform/discovery/found_devices.h"
 #include "platform/discovery/probe_match.h"

@@ -1,5 +1,5 @@
-// Any bytes taken for the parameters of an Axis device: the streams that they lead to have URLs at the
-// device's own host.
+// Any bytes taken for the parameters of an Axis device: the streams that they lead to have URLs at
+// the device's own host.
 
 #include "edge_app/setup/stream_choice.h"
 #include "platform/discovery/vapix_parameters.h"

@@ -196,13 +196,14 @@ TEST_F(ConfigTest, ABrokersPasswordMayStandInAFileAndIsToCrossNoNetworkInTheClea
 TEST_F(ConfigTest, ACamerasPasswordMayStandInAFileBesideTheConfiguration) {
   directory_.write("password", "open-sesame\n");
   const std::string login = ", user: eve, password_file: password}\n";
+  const std::string camera = "camera: {focal_length_px: 2500}\n";
   ASSERT_THAT(load("video: {type: rtsp, url: 'rtsp://camera/s'" + login +
-                   "pan_tilt: {type: onvif, url: 'http://camera'" + login),
+                   "pan_tilt: {type: onvif, url: 'http://camera'" + login + camera),
               IsEmpty());
   EXPECT_EQ(config_.video.password, "open-sesame");
   EXPECT_EQ(config_.pan_tilt.password, "open-sesame");
   ASSERT_THAT(load("video: {type: mjpeg, url: 'http://camera/s'" + login +
-                   "pan_tilt: {type: vapix, url: 'http://camera'" + login),
+                   "pan_tilt: {type: vapix, url: 'http://camera'" + login + camera),
               IsEmpty());
   EXPECT_EQ(config_.video.password, "open-sesame");
   EXPECT_EQ(config_.pan_tilt.password, "open-sesame");

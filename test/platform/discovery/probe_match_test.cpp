@@ -109,6 +109,17 @@ TEST(ProbeMatch, ReadsWhatADahuaDeviceSays) {
   EXPECT_EQ(matches[0].hardware, "IPC-HFW2228M-I1-V2");
 }
 
+// As the virtual camera ipycam sends it, against the standard.
+TEST(ProbeMatch, ReadsAMatchThatStandsAlone) {
+  std::string text =
+      answer("s", "d", kAsked[0],
+             match("d", "urn:uuid:1", "dn:NetworkVideoTransmitter", "", "http://192.0.2.9/a"));
+  for (const char* tag : {"<d:ProbeMatches>", "</d:ProbeMatches>"})
+    text.erase(text.find(tag), std::string(tag).size());
+  std::string error;
+  EXPECT_THAT(matches_of(text, &error), SizeIs(1)) << error;
+}
+
 TEST(ProbeMatch, APrinterIsNoCamera) {
   std::string error;
   const auto matches = matches_of(
