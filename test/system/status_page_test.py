@@ -25,8 +25,8 @@ SETTINGS = {
     "sensor": {"exposure_ms": 1, "read_noise": 1, "jpeg_quality": 90},
 }
 TOKEN = "right-horse"
-# What a browser says of frames that are late on a busy machine,
-LATE = r"/api/v1/picture.*status of 503|/api/v1/(direction|pixel|targets).*status of (404|409)"
+# What a browser says of frames that are late on a busy machine, and of a manual that is not there,
+LATE = r"/api/v1/picture.*status of 503|/api/v1/(direction|pixel|targets).*status of (404|409)|/manual/.*status of 404"
 # and of a server that is not there or wants a token: it is what these tests do to it.
 AWAY = r"ERR_CONNECTION_REFUSED|ERR_CONNECTION_RESET|ERR_EMPTY_RESPONSE|ERR_INCOMPLETE_CHUNKED_ENCODING|status of 401"
 
@@ -42,6 +42,12 @@ TELL_CLIPPED_TEXT = """
       if (u - size.actualBoundingBoxLeft < 0 || u + size.actualBoundingBoxRight > this.canvas.clientWidth) clipped.add(text);
       return draw.call(this, text, u, v);
     };"""
+
+# A server with a manual, for whoever asks for its head without a token.
+SERVE_A_MANUAL = """
+    const ask = window.fetch;
+    window.fetch = (path, options) => path === '/manual/' && options.method === 'HEAD' && !options.headers
+      ? Promise.resolve(new Response(null, {status: 200})) : ask(path, options);"""
 
 # Thirty on few metres of ground and in a part of the picture, and one at a pole whose place was known before: the names on plan and
 # picture, what is drawn over those on the picture, and the plan's caption.
@@ -432,6 +438,31 @@ class StatusPage(SystemTest):
         self.assertFalse(self.browser.find_element(By.ID, "login").is_displayed())
         self.assertEqual(self.browser.execute_script("return [localStorage.length, document.cookie, location.href]"),
                          [0, "", address])
+        self.assert_no_errors_but(f"{LATE}|{AWAY}")
+
+    def test_leads_to_the_manual_if_there_is_one_and_to_the_description_of_the_interface(self):
+        _, address = self.start(self.config(self.camera(settings=SETTINGS), token_env="TEST_TOKEN"), TEST_TOKEN=TOKEN)
+        request = urllib.request.Request(address + "manual/", method="HEAD")
+        try:
+            with urllib.request.urlopen(request, timeout=DEADLINE_S) as answer:
+                served = answer.status == 200
+        except urllib.error.HTTPError:
+            served = False
+        # Both before anybody has given the token.
+        self.browser.get(address)
+        wait_until(lambda: self.browser.find_element(By.ID, "token").is_displayed(), "the question for the token")
+        wait_until(lambda: self.browser.execute_script("return performance.getEntriesByName(location.origin + '/manual/').length > 0"),
+                   "the answer about the manual")
+        manual = self.browser.find_element(By.ID, "manual")
+        wait_until(lambda: manual.is_displayed() == served, f"a link to the manual: {served}")
+        description = self.browser.find_element(By.ID, "description")
+        with urllib.request.urlopen(description.get_attribute("href"), timeout=DEADLINE_S) as answer:
+            self.assertIn(b"openapi: 3", answer.read())
+
+        self.browser.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": SERVE_A_MANUAL})
+        self.browser.refresh()
+        wait_until(lambda: self.browser.find_element(By.ID, "manual").is_displayed(), "the link to the manual")
+        self.assertEqual(self.browser.find_element(By.ID, "manual").get_attribute("href"), address + "manual/")
         self.assert_no_errors_but(f"{LATE}|{AWAY}")
 
     def test_fits_a_phone_and_says_why_there_is_no_picture(self):

@@ -3,6 +3,7 @@
 
 import {showStatusForEver} from './health.js';
 import {showLink} from './link.js';
+import {showManualLink} from './manual.js';
 import {drawPicture, showPicturesForEver} from './picture.js';
 import {drawPlan} from './plan.js';
 import {drawPlots} from './plots.js';
@@ -35,6 +36,7 @@ for (const event of ['resize', 'visibilitychange']) {
 }
 matchMedia('(prefers-color-scheme: dark)').addEventListener('change', drawAll);
 drawAll();
+showManualLink();
 followForEver();
 showPicturesForEver();
 showStatusForEver();
