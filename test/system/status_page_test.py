@@ -83,6 +83,22 @@ NAMES_OF_A_CROWD = """
     return [names.plan, names.picture, over, document.getElementById('plan-caption').textContent];"""
 
 
+# What is said of azimuths on ground with an origin on Earth, and without one; on ground that the server does not tell.
+REFERENCES = """
+    const ask = window.fetch;
+    const told = [];
+    for (const plane of [{origin: {latitude_deg: 48}, heading: {value: -.5, sigma: .001}}, {origin: null, heading: {value: 1, sigma: .1}}, null]) {
+      window.fetch = async (path, options) => path !== '/api/v1/plane' ? ask(path, options)
+        : plane ? new Response(JSON.stringify(plane)) : new Response('{}', {status: 503});
+      north = null;
+      await sayReference({plane: {error: 'above the horizon'}}, plane !== null);
+      told.push(document.getElementById('reference').textContent);
+    }
+    window.fetch = ask;
+    north = null;
+    return told;"""
+
+
 class StatusPage(SystemTest):
     def setUp(self):
         super().setUp()
@@ -242,6 +258,7 @@ class StatusPage(SystemTest):
         self.assertAlmostEqual(clicked["v"], SETTINGS["image"]["height"] / 2 - 50 * scale, delta=2)
         self.assertRegex(self.text("azimuth"), r"^−?\d+\.\d{5}°$")
         self.assertRegex(self.text("sigma"), r"rad$")
+        self.says_from_what_azimuth_is_counted()
 
         picture.send_keys(Keys.ARROW_LEFT, Keys.ARROW_UP)
         crossed = self.direction_of(lambda: picture.send_keys(Keys.ENTER), address)
@@ -261,6 +278,16 @@ class StatusPage(SystemTest):
         wait_until(lambda: self.browser.execute_script("return samples.length > 0 && samples[0].t < arguments[0]", shown_s),
                    "the minute before the page was opened")
         self.assert_no_errors_but(LATE)
+
+    def says_from_what_azimuth_is_counted(self):
+        from_platform = "Azimuth: from the platform’s forward axis, where pan is 0; positive to the right. Elevation: positive upwards. "
+        from_scene = from_platform.replace("the platform’s forward axis, where pan is 0", "the forward axis of the scene map’s base")
+        self.wait_for_text("reference", f"^{from_platform}Nothing says where true north is.$")
+        north = r"That axis points 331\.35\d*\s±\s0\.057\d*\s° clockwise from true north.$"
+        on_earth, anywhere, untold = self.browser.execute_script(REFERENCES)
+        self.assertRegex(on_earth, f"^{from_scene}{north}")
+        self.assertEqual(anywhere, f"{from_scene}Nothing says where true north is.")
+        self.assertEqual(untold, f"{from_platform}Nothing says where true north is.")
 
     def fits_the_ground(self, picture):
         """Pixels are chosen and told to lie on ground 10 m below; three of them, and what is missing with fewer. The page tells what fits."""

@@ -5,6 +5,7 @@ import {postJson} from './api.js';
 import {element} from './elements.js';
 import {cross, forgetDirection, mark, moveCross, sayMarker} from './marker.js';
 import {drawPicture, picture} from './picture.js';
+import {sayReference} from './reference.js';
 import {record} from './stream.js';
 
 async function choose(u, v) {
@@ -24,6 +25,7 @@ async function choose(u, v) {
     const click = picture.overlay.width / element('picture').clientWidth / record.focal_length_px;
     mark(frame, u, v, answer, click);
     sayMarker(picture.overlay);
+    sayReference(answer, record.localized !== null);
   }
   drawPicture();
 }
