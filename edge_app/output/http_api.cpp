@@ -11,6 +11,7 @@
 
 #include "edge_app/output/calibration_json.h"
 #include "edge_app/output/detection_query.h"
+#include "edge_app/output/json_query.h"
 #include "edge_app/output/openapi.h"
 #include "edge_app/output/or_null.h"
 #include "edge_app/output/pixel_query.h"
@@ -164,13 +165,29 @@ bool choose_record(const HttpApiSources& sources, const FrameChoice& which,
   if (found != FrameSearch::kFound) {
     *error = http_error(404, found == FrameSearch::kNoneYet
                                  ? "no frame yet"
-                                 : "no such frame among those of the last seconds");
+                                 : "no such frame among those of the last seconds, and "
+                                   "those that are held");
     return false;
   }
   if (record->orientation) return true;
   *error = http_error(409, fmt::format("frame {} has no orientation: {}", *record->frame,
                                        to_string(record->status)));
   return false;
+}
+
+ServerResponse hold(const HttpApiSources& sources, const std::string& body) {
+  constexpr int kDeepest = 1;  // {"frame": N}
+  Json object;
+  FrameChoice which;
+  std::string error;
+  if (!parse_json_object(body, kDeepest, {"frame", "time_s"}, &object, &error) ||
+      !parse_frame_choice(object, &which, &error))
+    return http_error(400, error);
+  OrientationRecord record;
+  ServerResponse refusal;
+  if (!choose_record(sources, which, &record, &refusal)) return refusal;
+  sources.live->hold(record);
+  return text_response("application/json", json_line(record));
 }
 
 ServerResponse directions(const HttpApiSources& sources, const std::string& body) {
@@ -342,6 +359,8 @@ void add_api_routes(HttpServer* server, const HttpApiSources& sources) {
                [sources, pause = std::make_shared<CalibrationPause>()](const ServerRequest&) {
                  return calibrate(sources, pause.get());
                });
+  server->post("/api/v1/hold", HttpAccess::kToken, kMaxQueryBytes,
+               [sources](const ServerRequest& request) { return hold(sources, request.body); });
   server->post(
       "/api/v1/direction", HttpAccess::kToken, kMaxQueryBytes,
       [sources](const ServerRequest& request) { return directions(sources, request.body); });

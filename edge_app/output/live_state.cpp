@@ -71,7 +71,10 @@ bool LiveState::write(const OrientationRecord& record) {
 void LiveState::keep(const OrientationRecord& record) {
   // Time jumped back: another recording, or a clock that restarted. Older frames would be found at
   // wrong times.
-  if (!kept_.empty() && *record.time_s < *kept_.back().time_s) kept_.clear();
+  if (!kept_.empty() && *record.time_s < *kept_.back().time_s) {
+    kept_.clear();
+    held_.clear();
+  }
   kept_.push_back(record);
   while (kept_.size() > options_.max_kept ||
          *kept_.front().time_s < *record.time_s - options_.kept_s)
@@ -114,11 +117,22 @@ std::optional<OrientationRecord> LiveState::newest_oriented() const {
 FrameSearch LiveState::find(std::int64_t frame, OrientationRecord* record) const {
   const std::lock_guard<PriorityMutex> lock(mutex_);
   if (kept_.empty()) return FrameSearch::kNoneYet;
-  const auto found = std::find_if(kept_.rbegin(), kept_.rend(),
-                                  [frame](const auto& one) { return *one.frame == frame; });
-  if (found == kept_.rend()) return FrameSearch::kNotKept;
-  *record = *found;
-  return FrameSearch::kFound;
+  for (const std::deque<OrientationRecord>* records : {&kept_, &held_}) {
+    const auto found = std::find_if(records->rbegin(), records->rend(),
+                                    [frame](const auto& one) { return *one.frame == frame; });
+    if (found == records->rend()) continue;
+    *record = *found;
+    return FrameSearch::kFound;
+  }
+  return FrameSearch::kNotKept;
+}
+
+void LiveState::hold(const OrientationRecord& record) {
+  const std::lock_guard<PriorityMutex> lock(mutex_);
+  const auto is_it = [&record](const auto& one) { return *one.frame == *record.frame; };
+  held_.erase(std::remove_if(held_.begin(), held_.end(), is_it), held_.end());
+  held_.push_back(record);
+  if (held_.size() > kMaxHeld) held_.pop_front();
 }
 
 FrameSearch LiveState::find_at(double time_s, OrientationRecord* record) const {

@@ -6,7 +6,7 @@
 // All readers share one ring of lines. No reader waits for another. A reader that is too slow loses
 // the oldest lines and learns how many. write() is for the output thread: it formats the record,
 // holds a lock for microseconds and never waits for a reader. Any thread may call all other
-// functions. Memory is bounded: about 3 kB for each kept record and 1.5 kB for each line.
+// functions. Memory is bounded: about 3 kB for each kept or held record and 1.5 kB for each line.
 
 #include <cstdint>
 #include <deque>
@@ -62,7 +62,11 @@ class LiveState final : public RecordSink {
   [[nodiscard]] std::optional<OrientationRecord> newest() const;
   // The newest record with an orientation.
   [[nodiscard]] std::optional<OrientationRecord> newest_oriented() const;
+  // Among the records of the last seconds, and those that hold() keeps.
   [[nodiscard]] FrameSearch find(std::int64_t frame, OrientationRecord* record) const;
+  // Keeps a record with a frame for find() until kMaxHeld others are held, or time jumps back.
+  void hold(const OrientationRecord& record);
+  static constexpr std::size_t kMaxHeld = 16;
   // The frame whose row 0 was exposed nearest to time_s (s, host clock). The distance is at most
   // half the time to the frame's nearer neighbour, or 1 ms if half that time is less.
   [[nodiscard]] FrameSearch find_at(double time_s, OrientationRecord* record) const;
@@ -126,6 +130,7 @@ class LiveState final : public RecordSink {
   std::optional<OrientationRecord> newest_oriented_;
   double calibration_since_s_ = 0;
   std::deque<OrientationRecord> kept_;  // with frame and time, oldest first
+  std::deque<OrientationRecord> held_;  // with frame, the one held last at the end
   std::deque<HistorySample> history_;
   std::int64_t last_id_ = 0;
   std::deque<std::shared_ptr<const std::string>> lines_;  // back(): record last_id_

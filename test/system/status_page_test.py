@@ -26,7 +26,7 @@ SETTINGS = {
 }
 TOKEN = "right-horse"
 # What a browser says of frames that are late on a busy machine, and of a manual that is not there,
-LATE = r"/api/v1/picture.*status of 503|/api/v1/(direction|pixel|targets).*status of (404|409)|/manual/.*status of 404"
+LATE = r"/api/v1/picture.*status of 503|/api/v1/(direction|pixel|hold|targets).*status of (404|409)|/manual/.*status of 404"
 # and of a server that is not there or wants a token: it is what these tests do to it.
 AWAY = r"ERR_CONNECTION_REFUSED|ERR_CONNECTION_RESET|ERR_EMPTY_RESPONSE|ERR_INCOMPLETE_CHUNKED_ENCODING|status of 401"
 
@@ -266,6 +266,8 @@ class StatusPage(SystemTest):
         self.assertAlmostEqual(crossed["u"], SETTINGS["image"]["width"] / 2 - step)
         self.assertAlmostEqual(crossed["v"], SETTINGS["image"]["height"] / 2 - step)
 
+        self.freezes_the_picture(picture, address)
+
         # While the clock filter warms up and the links' delay is open, sigma is as large as the head is fast.
         wait_until(lambda: self.browser.execute_script("return record.mode === 'OE' && Math.max(...record.orientation_sigma_rad) < 1e-4"),
                    "a sure orientation")
@@ -278,6 +280,47 @@ class StatusPage(SystemTest):
         wait_until(lambda: self.browser.execute_script("return samples.length > 0 && samples[0].t < arguments[0]", shown_s),
                    "the minute before the page was opened")
         self.assert_no_errors_but(LATE)
+
+    def freezes_the_picture(self, picture, address):
+        """By keyboard; a pixel's direction is that in the frozen frame, also once the frames beside it are forgotten."""
+        button = self.browser.find_element(By.ID, "freeze")
+        self.assertEqual((self.text("freeze"), self.text("picture-title")), ("Freeze the picture", "Live picture"))
+        live = picture.value_of_css_property("box-shadow")
+
+        def froze():
+            self.browser.execute_script("say('frozen', '')")
+            button.send_keys(Keys.ENTER)
+            wait_until(lambda: self.text("frozen") != "", "an answer")
+            return self.text("frozen").startswith("Frozen")  # not: that frame was forgotten already
+        wait_until(froze, "a frozen picture")
+        said = self.wait_for_text("frozen", r"^Frozen at frame \d+: mode (OE|PT), pan −?\d+\.\d{4}°, tilt −?\d+\.\d{4}°\. A click gives the direction in this frame\.$")
+        frame = int(re.search(r"\d+", said)[0])
+        self.assertEqual((self.text("freeze"), self.text("picture-title")), ("Back to the live picture", "Frozen picture"))
+        self.assertNotEqual(picture.value_of_css_property("box-shadow"), live)
+        self.assertEqual(self.browser.switch_to.active_element, button)
+        self.assertRegex(self.text("seen"), f"^frame {frame}: ")
+
+        def beside():
+            body = json.dumps({"frame": frame + 1, "pixels": [[1, 1]]}).encode()
+            try:
+                with urllib.request.urlopen(urllib.request.Request(address + "api/v1/direction", body), timeout=DEADLINE_S):
+                    return True
+            except urllib.error.HTTPError as error:
+                return error.code != 404
+        wait_until(lambda: not beside(), "the next frame to be forgotten")
+        picture.send_keys(Keys.ARROW_RIGHT)
+        self.browser.execute_script("forgetDirection('')")
+        picture.send_keys(Keys.ENTER)
+        wait_until(lambda: self.text("pointing-hint") != "", "an answer")
+        told = {name: float(value) for name, value in self.browser.execute_script("return {...document.getElementById('pointing').dataset}").items()}
+        self.assertEqual(told["frame"], frame)
+        self.assertTrue(self.is_the_interfaces(told, address))
+        self.assertRegex(self.text("seen"), f"^frame {frame}: ")
+        self.screenshot("frozen.png")
+        button.send_keys(Keys.SPACE)
+        self.wait_for_text("frozen", "^Live: the picture goes on.$")
+        self.assertEqual((self.text("freeze"), self.text("picture-title")), ("Freeze the picture", "Live picture"))
+        wait_until(lambda: not re.search(f"^frame {frame}: ", self.text("seen")), "a live picture")
 
     def says_from_what_azimuth_is_counted(self):
         from_platform = "Azimuth: from the platform’s forward axis, where pan is 0; positive to the right. Elevation: positive upwards. "
@@ -412,6 +455,8 @@ class StatusPage(SystemTest):
         run, address = self.start(config)
         self.browser.get(address)
         self.wait_for_text("seen", r"frame \d+: .*used")
+        self.browser.find_element(By.ID, "freeze").send_keys(Keys.ENTER)
+        self.wait_for_text("frozen", "^Frozen at frame ")
         run.end(signal.SIGKILL)
         self.wait_for_text("link", r"disconnected: data is \d+ s old")
         wait_until(lambda: "grayscale(1)" in self.browser.find_element(By.ID, "mode").find_element(
@@ -420,6 +465,7 @@ class StatusPage(SystemTest):
         _, again = self.start(config)
         self.assertEqual(again, address)
         wait_until(lambda: self.browser.execute_script("return startId") != first_id, "the new program")
+        self.wait_for_text("frozen", "^Live: the program has begun anew")
         self.wait_for_text("link", "^live$")
         self.wait_for_text("seen", r"frame \d+: .*used")
         self.assert_no_errors_but(f"{LATE}|{AWAY}")

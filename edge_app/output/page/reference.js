@@ -1,5 +1,5 @@
 // From what azimuth and elevation are counted, in words below them.
-// True north is known only if the configuration has a ground plane with an origin on Earth (tracking.plane).
+// True north is known only if the ground plane (tracking.plane) has an origin on Earth.
 
 import {getJson} from './api.js';
 import {say} from './elements.js';

@@ -210,6 +210,31 @@ TEST_F(HttpApiTest, AFrameWithoutAnOrientationHasNoDirectionsAndSaysWhy) {
   EXPECT_THAT(get("/api/v1/calibration"), StartsWith("HTTP/1.1 404 "));
 }
 
+TEST_F(HttpApiTest, HoldsAFrameAndAnswersWithItsRecord) {
+  OrientationRecord record = record_without_orientation(7);
+  EXPECT_TRUE(live_.write(record));
+  EXPECT_THAT(post("/api/v1/hold", R"({"frame":7})"), StartsWith("HTTP/1.1 409 "));
+  EXPECT_THAT(post("/api/v1/hold", R"({"frame":8})"), StartsWith("HTTP/1.1 404 "));
+  EXPECT_THAT(post("/api/v1/hold", R"({"frames":8})"), StartsWith("HTTP/1.1 400 "));
+  record.frame = 8;
+  record.orientation = OrientationRecord::Orientation{};
+  EXPECT_TRUE(live_.write(record));
+  EXPECT_EQ(post("/api/v1/hold", R"({"frame":8})").substr(0, 12), "HTTP/1.1 200");
+  const json held = body_of(post("/api/v1/hold", "{}"));
+  EXPECT_EQ(held["frame"], 8);
+  EXPECT_EQ(held["time_s"], *record.time_s);
+  // Long after that.
+  record = record_without_orientation(1000);
+  EXPECT_TRUE(live_.write(record));
+  OrientationRecord found;
+  EXPECT_EQ(live_.find(7, &found), FrameSearch::kNotKept);
+  EXPECT_EQ(live_.find(8, &found), FrameSearch::kFound);
+  EXPECT_THAT(post("/api/v1/pixel", R"({"frame":7,"directions":[[1,0,0]]})"),
+              StartsWith("HTTP/1.1 404 "));
+  EXPECT_THAT(post("/api/v1/pixel", R"({"frame":8,"directions":[[1,0,0]]})"),
+              StartsWith("HTTP/1.1 200 "));
+}
+
 TEST_F(HttpApiTest, WithoutAPlaneSaysHowToHaveOne) {
   const std::string answer = get("/api/v1/plane");
   EXPECT_THAT(answer, StartsWith("HTTP/1.1 404 "));

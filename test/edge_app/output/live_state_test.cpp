@@ -76,6 +76,31 @@ TEST(LiveState, KeepsNoMoreFramesThanItMay) {
   EXPECT_EQ(state.find(46, &found), FrameSearch::kFound);
 }
 
+TEST(LiveState, HoldsAFrameForAsLongAsNobodyHoldsManyOthers) {
+  LiveState state;
+  write(&state, 0, 3);
+  OrientationRecord held;
+  ASSERT_EQ(state.find(2, &held), FrameSearch::kFound);
+  state.hold(held);
+  write(&state, 4, 500);  // 20 s
+  OrientationRecord found;
+  EXPECT_EQ(state.find(1, &found), FrameSearch::kNotKept);
+  ASSERT_EQ(state.find(2, &found), FrameSearch::kFound);
+  EXPECT_EQ(found.orientation->pan_rad, 2);
+  EXPECT_EQ(state.find_at(*held.time_s, &found), FrameSearch::kNotKept);
+  // Held again it is the newest of those that are held, once.
+  const auto hold_others = [&](std::int64_t from, std::size_t count) {
+    for (std::size_t i = 0; i < count; ++i) state.hold(record(from + static_cast<std::int64_t>(i)));
+  };
+  hold_others(100, LiveState::kMaxHeld - 1);
+  state.hold(held);
+  hold_others(200, LiveState::kMaxHeld - 1);
+  EXPECT_EQ(state.find(2, &found), FrameSearch::kFound);
+  hold_others(300, 1);
+  EXPECT_EQ(state.find(2, &found), FrameSearch::kNotKept);
+  EXPECT_EQ(state.find(200, &found), FrameSearch::kFound);
+}
+
 TEST(LiveState, FindsTheFrameNearestToATimeWithinHalfAPeriod) {
   LiveState state;
   OrientationRecord found;
@@ -122,11 +147,13 @@ TEST(LiveState, ALoneFrameAndOneCloseToAnotherAreFoundWithinAMillisecond) {
 TEST(LiveState, ForgetsFramesWhenTheirClockGoesBack) {
   LiveState state;
   write(&state, 50, 60);
+  state.hold(record(55));
   OrientationRecord back = record(61);
   back.time_s = 1;
   EXPECT_TRUE(state.write(back));
   OrientationRecord found;
   EXPECT_EQ(state.find(60, &found), FrameSearch::kNotKept);
+  EXPECT_EQ(state.find(55, &found), FrameSearch::kNotKept);
   EXPECT_EQ(state.find_at(1, &found), FrameSearch::kFound);
   EXPECT_EQ(found.frame, 61);
 }
