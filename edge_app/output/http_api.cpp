@@ -48,21 +48,30 @@ ServerResponse orientation(const HttpApiSources& sources) {
   return text_response("application/json", json_line(*newest));
 }
 
-ServerResponse history(const HttpApiSources& sources) {
+ServerResponse history(const HttpApiSources& sources, const ServerRequest& request) {
   using Sample = const HistorySample&;
   struct Column {
     const char* name;
     Json (*value)(Sample);
   };
-  static constexpr std::array<Column, 7> kColumns = {
+  static constexpr std::array<Column, 12> kColumns = {
       {{"time_s", [](Sample s) { return Json(s.time_s); }},
        {"mode", [](Sample s) { return Json(to_string(s.mode)); }},
        {"pan_rad", [](Sample s) { return or_null(s.pan_rad); }},
        {"tilt_rad", [](Sample s) { return or_null(s.tilt_rad); }},
        {"landmarks", [](Sample s) { return Json(s.landmarks); }},
        {"residual_px", [](Sample s) { return or_null(s.residual_px); }},
-       {"latency_s", [](Sample s) { return or_null(s.latency_s); }}}};
-  const auto samples = sources.live->history();
+       {"latency_s", [](Sample s) { return or_null(s.latency_s); }},
+       {"sigma_rad", [](Sample s) { return or_null(s.sigma_rad); }},
+       {"clock_offset_s", [](Sample s) { return or_null(s.clock_offset_s); }},
+       {"clock_offset_sigma_s", [](Sample s) { return or_null(s.clock_offset_sigma_s); }},
+       {"pan_error_rad",
+        [](Sample s) { return s.telemetry_error ? Json(s.telemetry_error->pan) : Json(); }},
+       {"tilt_error_rad",
+        [](Sample s) { return s.telemetry_error ? Json(s.telemetry_error->tilt) : Json(); }}}};
+  const std::string span = request.parameter("span").value_or("minute");
+  if (span != "minute" && span != "hour") return http_error(400, "span must be minute or hour");
+  const auto samples = span == "hour" ? sources.live->hour() : sources.live->history();
   Json columns;
   for (const Column& column : kColumns) {
     Json values = Json::array();
@@ -340,7 +349,7 @@ void add_api_routes(HttpServer* server, const HttpApiSources& sources) {
     return json_response(service_status(sources, server->counters()));
   });
   server->get("/api/v1/history", HttpAccess::kToken,
-              [sources](const ServerRequest&) { return history(sources); });
+              [sources](const ServerRequest& request) { return history(sources, request); });
   server->get("/api/v1/calibration", HttpAccess::kToken,
               [sources](const ServerRequest&) { return calibration(sources); });
   server->get("/api/v1/plane", HttpAccess::kToken,

@@ -1,7 +1,7 @@
 #pragma once
 // LiveState: the latest records of `alidade run`, for readers on other threads. It keeps the
-// records of the last seconds complete (for directions of pixels), the last minute thinned out (for
-// plots), and lines of JSON (for readers that follow).
+// records of the last seconds complete (for directions of pixels), the last minute and the last hour
+// thinned out (for plots), and lines of JSON (for readers that follow).
 //
 // All readers share one ring of lines. No reader waits for another. A reader that is too slow loses
 // the oldest lines and learns how many. write() is for the output thread: it formats the record,
@@ -19,6 +19,7 @@
 #include <utility>
 #include <vector>
 
+#include "edge_app/output/record_history.h"
 #include "edge_app/record/orientation_record.h"
 #include "platform/system/priority_mutex.h"
 
@@ -28,19 +29,10 @@ struct LiveStateOptions {
   double kept_s = 10;           // s of time_s; how long records with a frame are kept
   std::size_t max_kept = 2048;  // most records with a frame that are kept
   std::size_t max_lines = 512;  // most lines by which a reader may be behind
-  double history_s = 60;
-  double history_step_s = 0.1;
-};
-
-// One time step of the plots.
-struct HistorySample {
-  double time_s = 0;
-  RecordMode mode = RecordMode::kNone;
-  std::optional<double> pan_rad;
-  std::optional<double> tilt_rad;
-  int landmarks = 0;
-  std::optional<double> residual_px;
-  std::optional<double> latency_s;  // longest of the step
+  double minute_s = 60;         // length and step of the two histories
+  double minute_step_s = 0.1;
+  double hour_s = 3600;
+  double hour_step_s = 10;
 };
 
 // What a reader has got so far. `lost` includes losses of which the reader does not know yet.
@@ -70,7 +62,8 @@ class LiveState final : public RecordSink {
   // The frame whose row 0 was exposed nearest to time_s (s, host clock). The distance is at most
   // half the time to the frame's nearer neighbour, or 1 ms if half that time is less.
   [[nodiscard]] FrameSearch find_at(double time_s, OrientationRecord* record) const;
-  [[nodiscard]] std::vector<HistorySample> history() const;
+  [[nodiscard]] std::vector<HistorySample> history() const;  // of the last minute
+  [[nodiscard]] std::vector<HistorySample> hour() const;
   // Host time at which the calibration in use was first seen; empty before the first record.
   [[nodiscard]] std::optional<double> calibration_since_s() const;
 
@@ -117,7 +110,6 @@ class LiveState final : public RecordSink {
   [[nodiscard]] std::int64_t oldest_line() const;  // id
   [[nodiscard]] ReaderCounters counters_of(const Reader& reader) const;
   void keep(const OrientationRecord& record);
-  void add_to_history(const OrientationRecord& record);
 
   const LiveStateOptions options_;
   const std::string start_id_;
@@ -131,7 +123,8 @@ class LiveState final : public RecordSink {
   double calibration_since_s_ = 0;
   std::deque<OrientationRecord> kept_;  // with frame and time, oldest first
   std::deque<OrientationRecord> held_;  // with frame, the one held last at the end
-  std::deque<HistorySample> history_;
+  RecordHistory minute_;
+  RecordHistory hour_;
   std::int64_t last_id_ = 0;
   std::deque<std::shared_ptr<const std::string>> lines_;  // back(): record last_id_
   std::list<Reader*> readers_;

@@ -99,6 +99,33 @@ REFERENCES = """
     return told;"""
 
 
+# An hour: sigmas over three decades, no row from 30 to 20 minutes ago, no value from 10 to 5 minutes ago, and one row alone within
+# that. Of each plot: its words, and the minutes in which something is drawn over the grid.
+SHOW_AN_HOUR = """
+    const times = [...Array(361).keys()].filter((i) => i < 180 || i > 240).map((i) => 10 * i);
+    const column = (value) => times.map((t, i) => t > 3000 && t < 3300 && t !== 3150 ? null : value(t));
+    const names = ['sigma', 'offset', 'error'];
+    const pixels = (name) => {
+      const canvas = document.getElementById(`${name}-plot`);
+      return canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+    };
+    showHour({time_s: times, sigma_rad: column((t) => 2e-6 * 10 ** (t / 1500)), clock_offset_s: column(() => -.0844),
+      clock_offset_sigma_s: column(() => 2e-4), pan_error_rad: column((t) => 1e-4 + 2e-8 * t), tilt_error_rad: column(() => 5e-5)});
+    return Object.fromEntries(names.map((name) => {
+      const {data, width, height} = pixels(name);
+      const ratio = window.devicePixelRatio;
+      const drawn = new Set();
+      for (let u = Math.round(60 * ratio); u < width - 8 * ratio; ++u) {
+        for (let v = Math.round(24 * ratio); v < height - 34 * ratio; ++v) {
+          const [r, g, b, a] = data.slice(4 * (v * width + u), 4 * (v * width + u) + 4);
+          // Coloured, as lines and bands are; the grid is grey.
+          if (a > 40 && Math.max(r, g, b) - Math.min(r, g, b) > 40) drawn.add(Math.round((u / ratio - 58) / (width / ratio - 66) * 60 - 60));
+        }
+      }
+      return [name, [document.getElementById(`${name}-caption`).textContent, [...drawn]]];
+    }));"""
+
+
 class StatusPage(SystemTest):
     def setUp(self):
         super().setUp()
@@ -267,6 +294,7 @@ class StatusPage(SystemTest):
         self.assertAlmostEqual(crossed["v"], SETTINGS["image"]["height"] / 2 - step)
 
         self.freezes_the_picture(picture, address)
+        self.shows_the_last_hour()
 
         # While the clock filter warms up and the links' delay is open, sigma is as large as the head is fast.
         wait_until(lambda: self.browser.execute_script("return record.mode === 'OE' && Math.max(...record.orientation_sigma_rad) < 1e-4"),
@@ -321,6 +349,20 @@ class StatusPage(SystemTest):
         self.wait_for_text("frozen", "^Live: the picture goes on.$")
         self.assertEqual((self.text("freeze"), self.text("picture-title")), ("Freeze the picture", "Live picture"))
         wait_until(lambda: not re.search(f"^frame {frame}: ", self.text("seen")), "a live picture")
+
+    def shows_the_last_hour(self):
+        self.wait_for_text("sigma-caption", r"^Sigma: now [\d.]+ (µ|m)rad, from ")
+        self.wait_for_text("offset-caption", rf"^Clock offset: now −{-CLOCK_OFFSET_MS:.1f}\d\d ± 0\.\d{{3}} ms")
+        self.wait_for_text("error-caption", r"^Telemetry’s error: pan \d+\.\d{3} mrad, at most .*; tilt \d")
+        shown = self.browser.execute_script(SHOW_AN_HOUR)
+        self.assertEqual(shown["sigma"][0], "Sigma: now 502 µrad, from 2 µrad to 502 µrad")
+        self.assertEqual(shown["offset"][0], "Clock offset: now −84.400 ± 0.200 ms; the band is two standard deviations")
+        self.assertEqual(shown["error"][0], "Telemetry’s error: pan 0.172 mrad, at most 0.172; tilt 0.050 mrad, at most 0.050")
+        for name, (_, minutes) in shown.items():
+            self.assertTrue({*range(-59, -30), *range(-19, -10), *range(-4, -1)} <= {*minutes}, (name, minutes))
+            self.assertFalse({*range(-28, -21), -9, -6} & {*minutes}, (name, minutes))
+            self.assertTrue({-8, -7} & {*minutes}, (name, minutes))
+        self.screenshot("hour.png")
 
     def says_from_what_azimuth_is_counted(self):
         from_platform = "Azimuth: from the platform’s forward axis, where pan is 0; positive to the right. Elevation: positive upwards. "
@@ -554,6 +596,8 @@ class StatusPage(SystemTest):
             "pan_axis": {"value": [-0.012044, -0.000047, 1], "sigma": [5.9e-5, 4e-5]},
             "tilt_axis": {"value": [-0.00009, 1, -0.014056], "sigma": [1.2e-6, 6.9e-7]},
             "pan_scale": {"value": 1, "sigma": 1.2e-8}, "clock_offset": {"value": -0.0844, "sigma": 8.2e-5}})
+        self.browser.execute_script(SHOW_AN_HOUR)
+        self.screenshot("phone.png")
         self.assertEqual(self.browser.execute_script("return [innerWidth, document.documentElement.scrollWidth]"),
                          [390, 390])
         too_wide = self.browser.execute_script("""
