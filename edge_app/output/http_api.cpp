@@ -11,6 +11,7 @@
 
 #include "edge_app/output/calibration_json.h"
 #include "edge_app/output/detection_query.h"
+#include "edge_app/output/json_query.h"
 #include "edge_app/output/openapi.h"
 #include "edge_app/output/or_null.h"
 #include "edge_app/output/pixel_query.h"
@@ -47,21 +48,30 @@ ServerResponse orientation(const HttpApiSources& sources) {
   return text_response("application/json", json_line(*newest));
 }
 
-ServerResponse history(const HttpApiSources& sources) {
+ServerResponse history(const HttpApiSources& sources, const ServerRequest& request) {
   using Sample = const HistorySample&;
   struct Column {
     const char* name;
     Json (*value)(Sample);
   };
-  static constexpr std::array<Column, 7> kColumns = {
+  static constexpr std::array<Column, 12> kColumns = {
       {{"time_s", [](Sample s) { return Json(s.time_s); }},
        {"mode", [](Sample s) { return Json(to_string(s.mode)); }},
        {"pan_rad", [](Sample s) { return or_null(s.pan_rad); }},
        {"tilt_rad", [](Sample s) { return or_null(s.tilt_rad); }},
        {"landmarks", [](Sample s) { return Json(s.landmarks); }},
        {"residual_px", [](Sample s) { return or_null(s.residual_px); }},
-       {"latency_s", [](Sample s) { return or_null(s.latency_s); }}}};
-  const auto samples = sources.live->history();
+       {"latency_s", [](Sample s) { return or_null(s.latency_s); }},
+       {"sigma_rad", [](Sample s) { return or_null(s.sigma_rad); }},
+       {"clock_offset_s", [](Sample s) { return or_null(s.clock_offset_s); }},
+       {"clock_offset_sigma_s", [](Sample s) { return or_null(s.clock_offset_sigma_s); }},
+       {"pan_error_rad",
+        [](Sample s) { return s.telemetry_error ? Json(s.telemetry_error->pan) : Json(); }},
+       {"tilt_error_rad",
+        [](Sample s) { return s.telemetry_error ? Json(s.telemetry_error->tilt) : Json(); }}}};
+  const std::string span = request.parameter("span").value_or("minute");
+  if (span != "minute" && span != "hour") return http_error(400, "span must be minute or hour");
+  const auto samples = span == "hour" ? sources.live->hour() : sources.live->history();
   Json columns;
   for (const Column& column : kColumns) {
     Json values = Json::array();
@@ -164,13 +174,29 @@ bool choose_record(const HttpApiSources& sources, const FrameChoice& which,
   if (found != FrameSearch::kFound) {
     *error = http_error(404, found == FrameSearch::kNoneYet
                                  ? "no frame yet"
-                                 : "no such frame among those of the last seconds");
+                                 : "no such frame among those of the last seconds, and "
+                                   "those that are held");
     return false;
   }
   if (record->orientation) return true;
   *error = http_error(409, fmt::format("frame {} has no orientation: {}", *record->frame,
                                        to_string(record->status)));
   return false;
+}
+
+ServerResponse hold(const HttpApiSources& sources, const std::string& body) {
+  constexpr int kDeepest = 1;  // {"frame": N}
+  Json object;
+  FrameChoice which;
+  std::string error;
+  if (!parse_json_object(body, kDeepest, {"frame", "time_s"}, &object, &error) ||
+      !parse_frame_choice(object, &which, &error))
+    return http_error(400, error);
+  OrientationRecord record;
+  ServerResponse refusal;
+  if (!choose_record(sources, which, &record, &refusal)) return refusal;
+  sources.live->hold(record);
+  return text_response("application/json", json_line(record));
 }
 
 ServerResponse directions(const HttpApiSources& sources, const std::string& body) {
@@ -323,7 +349,7 @@ void add_api_routes(HttpServer* server, const HttpApiSources& sources) {
     return json_response(service_status(sources, server->counters()));
   });
   server->get("/api/v1/history", HttpAccess::kToken,
-              [sources](const ServerRequest&) { return history(sources); });
+              [sources](const ServerRequest& request) { return history(sources, request); });
   server->get("/api/v1/calibration", HttpAccess::kToken,
               [sources](const ServerRequest&) { return calibration(sources); });
   server->get("/api/v1/plane", HttpAccess::kToken,
@@ -342,6 +368,8 @@ void add_api_routes(HttpServer* server, const HttpApiSources& sources) {
                [sources, pause = std::make_shared<CalibrationPause>()](const ServerRequest&) {
                  return calibrate(sources, pause.get());
                });
+  server->post("/api/v1/hold", HttpAccess::kToken, kMaxQueryBytes,
+               [sources](const ServerRequest& request) { return hold(sources, request.body); });
   server->post(
       "/api/v1/direction", HttpAccess::kToken, kMaxQueryBytes,
       [sources](const ServerRequest& request) { return directions(sources, request.body); });

@@ -30,7 +30,11 @@ bool same(const PlainCalibration& a, const PlainCalibration& b) {
 }  // namespace
 
 LiveState::LiveState(const LiveStateOptions& options)
-    : options_(options), start_id_(make_start_id()), started_s_(monotonic_now_s()) {}
+    : options_(options),
+      start_id_(make_start_id()),
+      started_s_(monotonic_now_s()),
+      minute_(options.minute_s, options.minute_step_s),
+      hour_(options.hour_s, options.hour_step_s) {}
 
 bool LiveState::write(const OrientationRecord& record) {
   std::shared_ptr<const std::string> line;
@@ -50,7 +54,8 @@ bool LiveState::write(const OrientationRecord& record) {
     newest_ = record;
     if (record.orientation) newest_oriented_ = record;
     if (record.frame && record.time_s) keep(record);
-    add_to_history(record);
+    minute_.add(record);
+    hour_.add(record);
     ++last_id_;
     if (line == nullptr) {
       // There is no reader, or the first one came after the check above. It begins with the next
@@ -71,34 +76,14 @@ bool LiveState::write(const OrientationRecord& record) {
 void LiveState::keep(const OrientationRecord& record) {
   // Time jumped back: another recording, or a clock that restarted. Older frames would be found at
   // wrong times.
-  if (!kept_.empty() && *record.time_s < *kept_.back().time_s) kept_.clear();
+  if (!kept_.empty() && *record.time_s < *kept_.back().time_s) {
+    kept_.clear();
+    held_.clear();
+  }
   kept_.push_back(record);
   while (kept_.size() > options_.max_kept ||
          *kept_.front().time_s < *record.time_s - options_.kept_s)
     kept_.pop_front();
-}
-
-void LiveState::add_to_history(const OrientationRecord& record) {
-  const double time_s = record.time_s.value_or(record.receive_time_s);
-  const auto& latency_s = record.latency_s;
-  if (!history_.empty() && time_s < history_.back().time_s) history_.clear();
-  if (!history_.empty() && time_s < history_.back().time_s + options_.history_step_s) {
-    auto& longest_s = history_.back().latency_s;
-    if (latency_s) longest_s = std::max(longest_s.value_or(0), *latency_s);
-    return;
-  }
-  HistorySample sample;
-  sample.time_s = time_s;
-  sample.mode = record.mode;
-  if (record.orientation) {
-    sample.pan_rad = record.orientation->pan_rad;
-    sample.tilt_rad = record.orientation->tilt_rad;
-  }
-  sample.landmarks = record.landmarks;
-  sample.residual_px = record.residual_px;
-  sample.latency_s = latency_s;
-  history_.push_back(sample);
-  while (history_.front().time_s < time_s - options_.history_s) history_.pop_front();
 }
 
 std::optional<OrientationRecord> LiveState::newest() const {
@@ -114,11 +99,22 @@ std::optional<OrientationRecord> LiveState::newest_oriented() const {
 FrameSearch LiveState::find(std::int64_t frame, OrientationRecord* record) const {
   const std::lock_guard<PriorityMutex> lock(mutex_);
   if (kept_.empty()) return FrameSearch::kNoneYet;
-  const auto found = std::find_if(kept_.rbegin(), kept_.rend(),
-                                  [frame](const auto& one) { return *one.frame == frame; });
-  if (found == kept_.rend()) return FrameSearch::kNotKept;
-  *record = *found;
-  return FrameSearch::kFound;
+  for (const std::deque<OrientationRecord>* records : {&kept_, &held_}) {
+    const auto found = std::find_if(records->rbegin(), records->rend(),
+                                    [frame](const auto& one) { return *one.frame == frame; });
+    if (found == records->rend()) continue;
+    *record = *found;
+    return FrameSearch::kFound;
+  }
+  return FrameSearch::kNotKept;
+}
+
+void LiveState::hold(const OrientationRecord& record) {
+  const std::lock_guard<PriorityMutex> lock(mutex_);
+  const auto is_it = [&record](const auto& one) { return *one.frame == *record.frame; };
+  held_.erase(std::remove_if(held_.begin(), held_.end(), is_it), held_.end());
+  held_.push_back(record);
+  if (held_.size() > kMaxHeld) held_.pop_front();
 }
 
 FrameSearch LiveState::find_at(double time_s, OrientationRecord* record) const {
@@ -147,7 +143,12 @@ FrameSearch LiveState::find_at(double time_s, OrientationRecord* record) const {
 
 std::vector<HistorySample> LiveState::history() const {
   const std::lock_guard<PriorityMutex> lock(mutex_);
-  return {history_.begin(), history_.end()};
+  return minute_.samples();
+}
+
+std::vector<HistorySample> LiveState::hour() const {
+  const std::lock_guard<PriorityMutex> lock(mutex_);
+  return hour_.samples();
 }
 
 std::optional<double> LiveState::calibration_since_s() const {

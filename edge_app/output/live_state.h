@@ -1,12 +1,12 @@
 #pragma once
 // LiveState: the latest records of `alidade run`, for readers on other threads. It keeps the
-// records of the last seconds complete (for directions of pixels), the last minute thinned out (for
-// plots), and lines of JSON (for readers that follow).
+// records of the last seconds complete (for directions of pixels), the last minute and the last hour
+// thinned out (for plots), and lines of JSON (for readers that follow).
 //
 // All readers share one ring of lines. No reader waits for another. A reader that is too slow loses
 // the oldest lines and learns how many. write() is for the output thread: it formats the record,
 // holds a lock for microseconds and never waits for a reader. Any thread may call all other
-// functions. Memory is bounded: about 3 kB for each kept record and 1.5 kB for each line.
+// functions. Memory is bounded: about 3 kB for each kept or held record and 1.5 kB for each line.
 
 #include <cstdint>
 #include <deque>
@@ -19,6 +19,7 @@
 #include <utility>
 #include <vector>
 
+#include "edge_app/output/record_history.h"
 #include "edge_app/record/orientation_record.h"
 #include "platform/system/priority_mutex.h"
 
@@ -28,19 +29,11 @@ struct LiveStateOptions {
   double kept_s = 10;           // s of time_s; how long records with a frame are kept
   std::size_t max_kept = 2048;  // most records with a frame that are kept
   std::size_t max_lines = 512;  // most lines by which a reader may be behind
-  double history_s = 60;        // s; how long samples for plots are kept
-  double history_step_s = 0.1;  // s; least time from sample to sample
-};
-
-// One time step of the plots: the values of its first record, except the latency.
-struct HistorySample {
-  double time_s = 0;  // s, host clock; the receive time if the record has no other
-  RecordMode mode = RecordMode::kNone;
-  std::optional<double> pan_rad;
-  std::optional<double> tilt_rad;
-  int landmarks = 0;
-  std::optional<double> residual_px;
-  std::optional<double> latency_s;  // longest of the step
+  // s; how long samples for the plots of the last minute are kept, least time from sample to sample
+  double minute_s = 60;
+  double minute_step_s = 0.1;
+  double hour_s = 3600;  // likewise, of the last hour
+  double hour_step_s = 10;
 };
 
 // What a reader has got so far. `lost` includes losses of which the reader does not know yet.
@@ -63,11 +56,16 @@ class LiveState final : public RecordSink {
   [[nodiscard]] std::optional<OrientationRecord> newest() const;
   // The newest record with an orientation.
   [[nodiscard]] std::optional<OrientationRecord> newest_oriented() const;
+  // Among the records of the last seconds, and those that hold() keeps.
   [[nodiscard]] FrameSearch find(std::int64_t frame, OrientationRecord* record) const;
+  // Keeps a record with a frame for find() until kMaxHeld others are held, or time jumps back.
+  void hold(const OrientationRecord& record);
+  static constexpr std::size_t kMaxHeld = 16;
   // The frame whose row 0 was exposed nearest to time_s (s, host clock). The distance is at most
   // half the time to the frame's nearer neighbour, or 1 ms if half that time is less.
   [[nodiscard]] FrameSearch find_at(double time_s, OrientationRecord* record) const;
-  [[nodiscard]] std::vector<HistorySample> history() const;
+  [[nodiscard]] std::vector<HistorySample> history() const;  // of the last minute
+  [[nodiscard]] std::vector<HistorySample> hour() const;
   // Host time at which the calibration in use was first seen; empty before the first record.
   [[nodiscard]] std::optional<double> calibration_since_s() const;
 
@@ -114,7 +112,6 @@ class LiveState final : public RecordSink {
   [[nodiscard]] std::int64_t oldest_line() const;  // id
   [[nodiscard]] ReaderCounters counters_of(const Reader& reader) const;
   void keep(const OrientationRecord& record);
-  void add_to_history(const OrientationRecord& record);
 
   const LiveStateOptions options_;
   const std::string start_id_;
@@ -127,7 +124,9 @@ class LiveState final : public RecordSink {
   std::optional<OrientationRecord> newest_oriented_;
   double calibration_since_s_ = 0;
   std::deque<OrientationRecord> kept_;  // with frame and time, oldest first
-  std::deque<HistorySample> history_;
+  std::deque<OrientationRecord> held_;  // with frame, the one held last at the end
+  RecordHistory minute_;
+  RecordHistory hour_;
   std::int64_t last_id_ = 0;
   std::deque<std::shared_ptr<const std::string>> lines_;  // back(): record last_id_
   std::list<Reader*> readers_;

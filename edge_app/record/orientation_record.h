@@ -47,6 +47,9 @@ struct OrientationRecord {
   int landmarks = 0;  // number that support the orientation; 0 unless in mode OE
   // px, root mean square length of their residuals; empty unless in mode OE.
   std::optional<double> residual_px;
+  // rad, telemetry's true angles minus the answer's, in the base of the record, when the middle row
+  // was exposed. Empty unless in mode OE with telemetry for this frame.
+  std::optional<PanTilt<double>> telemetry_error;
   PlainCalibration camera;  // the calibration in use
   // Device units: the reading that the pan/tilt source reported last. Empty: it reports no zoom.
   std::optional<double> zoom;

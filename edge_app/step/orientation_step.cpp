@@ -309,6 +309,23 @@ void OrientationStep::orient(const InterpolatedPanTilt* measured, const ImageVie
   }
   record->orientation = orientation_of(frame);
   note_tie(record);
+  if (record->mode == RecordMode::kOe && measured != nullptr)
+    record->telemetry_error = telemetry_error(*measured, frame, *record);
+}
+
+PanTilt<double> OrientationStep::telemetry_error(const InterpolatedPanTilt& measured,
+                                                 const FrameOrientation& frame,
+                                                 const OrientationRecord& record) {
+  const Camera<double>& camera = frame.calibration.camera;
+  const double t = frame.calibration.line_delay * (0.5 * camera.height);  // to the middle row
+  const Vector2<double> answer =
+      frame.angle.vector() + frame.rate.vector() * t + frame.acceleration.vector() * (0.5 * t * t);
+  const PanTilt<double> zero =
+      record.localized ? record.localized->telemetry_zero : PanTilt<double>{};
+  const PanTilt<double> told = true_from_measured(frame.calibration.mechanics, measured.angle);
+  const Vector2<double> error =
+      minus(plus(told, zero.vector()), PanTilt<double>{answer.x(), answer.y()});
+  return {error.x(), error.y()};
 }
 
 void OrientationStep::maintain() {

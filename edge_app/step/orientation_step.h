@@ -187,6 +187,10 @@ class OrientationStep {
   void orient(const InterpolatedPanTilt* measured, const ImageView& image, const FrameLens* lens,
               OrientationRecord* record);
 
+  // Of a record of mode OE, complete but for this: see there.
+  [[nodiscard]] static PanTilt<double> telemetry_error(const InterpolatedPanTilt& measured,
+                                                       const FrameOrientation& frame,
+                                                       const OrientationRecord& record);
   // Without telemetry: completes a record that has its time.
   void orient_by_scene(const ImageView& image, OrientationRecord* record);
   // True: from here on landmarks hold, in the base of the localized frame.

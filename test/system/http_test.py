@@ -224,6 +224,9 @@ class Http(SystemTest):
         self.check_answer(api, "/api/v1/status")
         history = self.check_answer(api, "/api/v1/history")
         self.assertEqual(1, len({len(column) for column in history.values()}))
+        hour = self.check_answer(api, "/api/v1/history?span=hour")
+        self.assertEqual(1, len({len(column) for column in hour.values()}))
+        self.assertGreater(len(hour["time_s"]), 0)
         calibration = self.check_answer(api, "/api/v1/calibration")
         self.assertEqual(calibration["image"], {key: IMAGE[key] for key in ("width", "height")})
         self.check_answer(api, "/api/v1/calibrate", 409, b"")
@@ -263,6 +266,7 @@ class Http(SystemTest):
             self.assertIn("error", back["pixels"][3])
             for one, pixel in zip(back["pixels"], ([80, 48], [0, 0], [160, 96])):
                 self.assertLess(math.dist(one["pixel"], pixel), 1e-6)
+        self.assertEqual(self.check_answer(api, "/api/v1/hold", body={"frame": frame})["frame"], frame)
         # The centre of a frame at rest is where its q looks; here it turns, by at most a pixel or so until its row.
         x, y, z, w = record["q_base_from_camera"]
         forward = [2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)]
@@ -270,12 +274,13 @@ class Http(SystemTest):
         for path, body, status in (
                 ("/api/v1/direction", {"pixels": []}, 400), ("/api/v1/direction", {"frame": 10**9, "pixels": [[1, 1]]}, 404),
                 ("/api/v1/direction", {"pixels": [[1, 1]], "padding": "x" * 70000}, 413),
+                ("/api/v1/hold", {"frame": -1}, 400), ("/api/v1/hold", {"frame": 10**9}, 404),
                 ("/api/v1/pixel", {"directions": [[0, 0, 0]]}, 400), ("/api/v1/pixel", {"time_s": 0, "directions": [[1, 0, 0]]}, 404)):
             self.check_answer(api, path, status, body)
         for path in ("/api/v1/orientation", "/api/v1/status", "/api/v1/history", "/api/v1/calibration", "/api/v1/targets"):
             self.check_answer(api, path, 401, token="wrong-horse")
             self.check_answer(api, path, 401, token=None)
-        for path in ("/api/v1/direction", "/api/v1/pixel", "/api/v1/calibrate", "/api/v1/detections", "/api/v1/stream/ticket"):
+        for path in ("/api/v1/direction", "/api/v1/pixel", "/api/v1/hold", "/api/v1/calibrate", "/api/v1/detections", "/api/v1/stream/ticket"):
             self.check_answer(api, path, 401, {}, token=None)
         self.end(run)
         told = [json.loads(line) for line in (self.folder / "targets.jsonl").read_text().splitlines()]
@@ -310,6 +315,7 @@ class Http(SystemTest):
                     {"frame": 0, "boxes": [{**box, "x": 1}]}, {"frame": 0, "boxes": [{**box, "class": "x" * 33}]},
                     {"frame": 0, "boxes": [{**box, "class": None}]}, {"frame": 0, "boxes": [{**box, "score": None}]},
                     {"frame": 0, "boxes": [], "camera": 1}),
+                "/api/v1/hold": ({}, {"frame": 0}, {"time_s": -1.5}, [], {"frame": -1}, {"frame": "1"}, {"frame": 1, "time_s": 1}, pixels),
                 "/api/v1/pixel": (
                     directions, {"directions": [[0, 0, -1e-300]]}, {**directions, "time_s": 0}, {"directions": [[0, 0, 0]]},
                     {"directions": [[1, 0, 0], [0, 0, 1e-320]]}, {"directions": [[1, 0]]}, {**directions, "frame": -1},

@@ -25,8 +25,8 @@ SETTINGS = {
     "sensor": {"exposure_ms": 1, "read_noise": 1, "jpeg_quality": 90},
 }
 TOKEN = "right-horse"
-# What a browser says of frames that are late on a busy machine,
-LATE = r"/api/v1/picture.*status of 503|/api/v1/(direction|pixel|targets).*status of (404|409)"
+# What a browser says of frames that are late on a busy machine, and of a manual that is not there,
+LATE = r"/api/v1/picture.*status of 503|/api/v1/(direction|pixel|hold|targets).*status of (404|409)|/manual/.*status of 404"
 # and of a server that is not there or wants a token: it is what these tests do to it.
 AWAY = r"ERR_CONNECTION_REFUSED|ERR_CONNECTION_RESET|ERR_EMPTY_RESPONSE|ERR_INCOMPLETE_CHUNKED_ENCODING|status of 401"
 
@@ -42,6 +42,12 @@ TELL_CLIPPED_TEXT = """
       if (u - size.actualBoundingBoxLeft < 0 || u + size.actualBoundingBoxRight > this.canvas.clientWidth) clipped.add(text);
       return draw.call(this, text, u, v);
     };"""
+
+# A server with a manual, for whoever asks for its head without a token.
+SERVE_A_MANUAL = """
+    const ask = window.fetch;
+    window.fetch = (path, options) => path === '/manual/' && options.method === 'HEAD' && !options.headers
+      ? Promise.resolve(new Response(null, {status: 200})) : ask(path, options);"""
 
 # Thirty on few metres of ground and in a part of the picture, and one at a pole whose place was known before: the names on plan and
 # picture, what is drawn over those on the picture, and the plan's caption.
@@ -75,6 +81,49 @@ NAMES_OF_A_CROWD = """
     Object.assign(CanvasRenderingContext2D.prototype, {fillText, strokeRect});
     ({targets, trails} = kept);
     return [names.plan, names.picture, over, document.getElementById('plan-caption').textContent];"""
+
+
+# What is said of azimuths on ground with an origin on Earth, and without one; on ground that the server does not tell.
+REFERENCES = """
+    const ask = window.fetch;
+    const told = [];
+    for (const plane of [{origin: {latitude_deg: 48}, heading: {value: -.5, sigma: .001}}, {origin: null, heading: {value: 1, sigma: .1}}, null]) {
+      window.fetch = async (path, options) => path !== '/api/v1/plane' ? ask(path, options)
+        : plane ? new Response(JSON.stringify(plane)) : new Response('{}', {status: 503});
+      north = null;
+      await sayReference({plane: {error: 'above the horizon'}}, plane !== null);
+      told.push(document.getElementById('reference').textContent);
+    }
+    window.fetch = ask;
+    north = null;
+    return told;"""
+
+
+# An hour: sigmas over three decades, no row from 30 to 20 minutes ago, no value from 10 to 5 minutes ago, and one row alone within
+# that. Of each plot: its words, and the minutes in which something is drawn over the grid.
+SHOW_AN_HOUR = """
+    const times = [...Array(361).keys()].filter((i) => i < 180 || i > 240).map((i) => 10 * i);
+    const column = (value) => times.map((t, i) => t > 3000 && t < 3300 && t !== 3150 ? null : value(t));
+    const names = ['sigma', 'offset', 'error'];
+    const pixels = (name) => {
+      const canvas = document.getElementById(`${name}-plot`);
+      return canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+    };
+    showHour({time_s: times, sigma_rad: column((t) => 2e-6 * 10 ** (t / 1500)), clock_offset_s: column(() => -.0844),
+      clock_offset_sigma_s: column(() => 2e-4), pan_error_rad: column((t) => 1e-4 + 2e-8 * t), tilt_error_rad: column(() => 5e-5)});
+    return Object.fromEntries(names.map((name) => {
+      const {data, width, height} = pixels(name);
+      const ratio = window.devicePixelRatio;
+      const drawn = new Set();
+      for (let u = Math.round(60 * ratio); u < width - 8 * ratio; ++u) {
+        for (let v = Math.round(24 * ratio); v < height - 34 * ratio; ++v) {
+          const [r, g, b, a] = data.slice(4 * (v * width + u), 4 * (v * width + u) + 4);
+          // Coloured, as lines and bands are; the grid is grey.
+          if (a > 40 && Math.max(r, g, b) - Math.min(r, g, b) > 40) drawn.add(Math.round((u / ratio - 58) / (width / ratio - 66) * 60 - 60));
+        }
+      }
+      return [name, [document.getElementById(`${name}-caption`).textContent, [...drawn]]];
+    }));"""
 
 
 class StatusPage(SystemTest):
@@ -236,12 +285,16 @@ class StatusPage(SystemTest):
         self.assertAlmostEqual(clicked["v"], SETTINGS["image"]["height"] / 2 - 50 * scale, delta=2)
         self.assertRegex(self.text("azimuth"), r"^−?\d+\.\d{5}°$")
         self.assertRegex(self.text("sigma"), r"rad$")
+        self.says_from_what_azimuth_is_counted()
 
         picture.send_keys(Keys.ARROW_LEFT, Keys.ARROW_UP)
         crossed = self.direction_of(lambda: picture.send_keys(Keys.ENTER), address)
         step = SETTINGS["image"]["width"] / 100
         self.assertAlmostEqual(crossed["u"], SETTINGS["image"]["width"] / 2 - step)
         self.assertAlmostEqual(crossed["v"], SETTINGS["image"]["height"] / 2 - step)
+
+        self.freezes_the_picture(picture, address)
+        self.shows_the_last_hour()
 
         # While the clock filter warms up and the links' delay is open, sigma is as large as the head is fast.
         wait_until(lambda: self.browser.execute_script("return record.mode === 'OE' && Math.max(...record.orientation_sigma_rad) < 1e-4"),
@@ -255,6 +308,71 @@ class StatusPage(SystemTest):
         wait_until(lambda: self.browser.execute_script("return samples.length > 0 && samples[0].t < arguments[0]", shown_s),
                    "the minute before the page was opened")
         self.assert_no_errors_but(LATE)
+
+    def freezes_the_picture(self, picture, address):
+        """By keyboard; a pixel's direction is that in the frozen frame, also once the frames beside it are forgotten."""
+        button = self.browser.find_element(By.ID, "freeze")
+        self.assertEqual((self.text("freeze"), self.text("picture-title")), ("Freeze the picture", "Live picture"))
+        live = picture.value_of_css_property("box-shadow")
+
+        def froze():
+            self.browser.execute_script("say('frozen', '')")
+            button.send_keys(Keys.ENTER)
+            wait_until(lambda: self.text("frozen") != "", "an answer")
+            return self.text("frozen").startswith("Frozen")  # not: that frame was forgotten already
+        wait_until(froze, "a frozen picture")
+        said = self.wait_for_text("frozen", r"^Frozen at frame \d+: mode (OE|PT), pan −?\d+\.\d{4}°, tilt −?\d+\.\d{4}°\. A click gives the direction in this frame\.$")
+        frame = int(re.search(r"\d+", said)[0])
+        self.assertEqual((self.text("freeze"), self.text("picture-title")), ("Back to the live picture", "Frozen picture"))
+        self.assertNotEqual(picture.value_of_css_property("box-shadow"), live)
+        self.assertEqual(self.browser.switch_to.active_element, button)
+        self.assertRegex(self.text("seen"), f"^frame {frame}: ")
+
+        def beside():
+            body = json.dumps({"frame": frame + 1, "pixels": [[1, 1]]}).encode()
+            try:
+                with urllib.request.urlopen(urllib.request.Request(address + "api/v1/direction", body), timeout=DEADLINE_S):
+                    return True
+            except urllib.error.HTTPError as error:
+                return error.code != 404
+        wait_until(lambda: not beside(), "the next frame to be forgotten")
+        picture.send_keys(Keys.ARROW_RIGHT)
+        self.browser.execute_script("forgetDirection('')")
+        picture.send_keys(Keys.ENTER)
+        wait_until(lambda: self.text("pointing-hint") != "", "an answer")
+        told = {name: float(value) for name, value in self.browser.execute_script("return {...document.getElementById('pointing').dataset}").items()}
+        self.assertEqual(told["frame"], frame)
+        self.assertTrue(self.is_the_interfaces(told, address))
+        self.assertRegex(self.text("seen"), f"^frame {frame}: ")
+        self.screenshot("frozen.png")
+        button.send_keys(Keys.SPACE)
+        self.wait_for_text("frozen", "^Live: the picture goes on.$")
+        self.assertEqual((self.text("freeze"), self.text("picture-title")), ("Freeze the picture", "Live picture"))
+        wait_until(lambda: not re.search(f"^frame {frame}: ", self.text("seen")), "a live picture")
+
+    def shows_the_last_hour(self):
+        self.wait_for_text("sigma-caption", r"^Sigma: now [\d.]+ (µ|m)rad, from ")
+        self.wait_for_text("offset-caption", rf"^Clock offset: now −{-CLOCK_OFFSET_MS:.1f}\d\d ± 0\.\d{{3}} ms")
+        self.wait_for_text("error-caption", r"^Telemetry’s error: pan \d+\.\d{3} mrad, at most .*; tilt \d")
+        shown = self.browser.execute_script(SHOW_AN_HOUR)
+        self.assertEqual(shown["sigma"][0], "Sigma: now 502 µrad, from 2 µrad to 502 µrad")
+        self.assertEqual(shown["offset"][0], "Clock offset: now −84.400 ± 0.200 ms; the band is two standard deviations")
+        self.assertEqual(shown["error"][0], "Telemetry’s error: pan 0.172 mrad, at most 0.172; tilt 0.050 mrad, at most 0.050")
+        for name, (_, minutes) in shown.items():
+            self.assertTrue({*range(-59, -30), *range(-19, -10), *range(-4, -1)} <= {*minutes}, (name, minutes))
+            self.assertFalse({*range(-28, -21), -9, -6} & {*minutes}, (name, minutes))
+            self.assertTrue({-8, -7} & {*minutes}, (name, minutes))
+        self.screenshot("hour.png")
+
+    def says_from_what_azimuth_is_counted(self):
+        from_platform = "Azimuth: from the platform’s forward axis, where pan is 0; positive to the right. Elevation: positive upwards. "
+        from_scene = from_platform.replace("the platform’s forward axis, where pan is 0", "the forward axis of the scene map’s base")
+        self.wait_for_text("reference", f"^{from_platform}Nothing says where true north is.$")
+        north = r"That axis points 331\.35\d*\s±\s0\.057\d*\s° clockwise from true north.$"
+        on_earth, anywhere, untold = self.browser.execute_script(REFERENCES)
+        self.assertRegex(on_earth, f"^{from_scene}{north}")
+        self.assertEqual(anywhere, f"{from_scene}Nothing says where true north is.")
+        self.assertEqual(untold, f"{from_platform}Nothing says where true north is.")
 
     def fits_the_ground(self, picture):
         """Pixels are chosen and told to lie on ground 10 m below; three of them, and what is missing with fewer. The page tells what fits."""
@@ -379,6 +497,8 @@ class StatusPage(SystemTest):
         run, address = self.start(config)
         self.browser.get(address)
         self.wait_for_text("seen", r"frame \d+: .*used")
+        self.browser.find_element(By.ID, "freeze").send_keys(Keys.ENTER)
+        self.wait_for_text("frozen", "^Frozen at frame ")
         run.end(signal.SIGKILL)
         self.wait_for_text("link", r"disconnected: data is \d+ s old")
         wait_until(lambda: "grayscale(1)" in self.browser.find_element(By.ID, "mode").find_element(
@@ -387,6 +507,7 @@ class StatusPage(SystemTest):
         _, again = self.start(config)
         self.assertEqual(again, address)
         wait_until(lambda: self.browser.execute_script("return startId") != first_id, "the new program")
+        self.wait_for_text("frozen", "^Live: the program has begun anew")
         self.wait_for_text("link", "^live$")
         self.wait_for_text("seen", r"frame \d+: .*used")
         self.assert_no_errors_but(f"{LATE}|{AWAY}")
@@ -434,6 +555,31 @@ class StatusPage(SystemTest):
                          [0, "", address])
         self.assert_no_errors_but(f"{LATE}|{AWAY}")
 
+    def test_leads_to_the_manual_if_there_is_one_and_to_the_description_of_the_interface(self):
+        _, address = self.start(self.config(self.camera(settings=SETTINGS), token_env="TEST_TOKEN"), TEST_TOKEN=TOKEN)
+        request = urllib.request.Request(address + "manual/", method="HEAD")
+        try:
+            with urllib.request.urlopen(request, timeout=DEADLINE_S) as answer:
+                served = answer.status == 200
+        except urllib.error.HTTPError:
+            served = False
+        # Both before anybody has given the token.
+        self.browser.get(address)
+        wait_until(lambda: self.browser.find_element(By.ID, "token").is_displayed(), "the question for the token")
+        wait_until(lambda: self.browser.execute_script("return performance.getEntriesByName(location.origin + '/manual/').length > 0"),
+                   "the answer about the manual")
+        manual = self.browser.find_element(By.ID, "manual")
+        wait_until(lambda: manual.is_displayed() == served, f"a link to the manual: {served}")
+        description = self.browser.find_element(By.ID, "description")
+        with urllib.request.urlopen(description.get_attribute("href"), timeout=DEADLINE_S) as answer:
+            self.assertIn(b"openapi: 3", answer.read())
+
+        self.browser.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": SERVE_A_MANUAL})
+        self.browser.refresh()
+        wait_until(lambda: self.browser.find_element(By.ID, "manual").is_displayed(), "the link to the manual")
+        self.assertEqual(self.browser.find_element(By.ID, "manual").get_attribute("href"), address + "manual/")
+        self.assert_no_errors_but(f"{LATE}|{AWAY}")
+
     def test_fits_a_phone_and_says_why_there_is_no_picture(self):
         self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {
             "width": 390, "height": 844, "deviceScaleFactor": 3, "mobile": True})
@@ -450,6 +596,8 @@ class StatusPage(SystemTest):
             "pan_axis": {"value": [-0.012044, -0.000047, 1], "sigma": [5.9e-5, 4e-5]},
             "tilt_axis": {"value": [-0.00009, 1, -0.014056], "sigma": [1.2e-6, 6.9e-7]},
             "pan_scale": {"value": 1, "sigma": 1.2e-8}, "clock_offset": {"value": -0.0844, "sigma": 8.2e-5}})
+        self.browser.execute_script(SHOW_AN_HOUR)
+        self.screenshot("phone.png")
         self.assertEqual(self.browser.execute_script("return [innerWidth, document.documentElement.scrollWidth]"),
                          [390, 390])
         too_wide = self.browser.execute_script("""

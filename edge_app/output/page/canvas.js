@@ -29,7 +29,8 @@ export function niceStep(span, count) {
   return power * ([1, 2, 5].find((one) => one * power >= rough) ?? 10);
 }
 
-// Draws the axes and gives back where a point is. x and y: {from, to, step, name, label}.
+// Draws the axes and gives back where a point is. x and y: {from, to, step, name}; text, if given,
+// writes a value of y.
 export function axes({pen, width, height}, x, y) {
   const left = 58;
   const right = width - 8;
@@ -51,7 +52,7 @@ export function axes({pen, width, height}, x, y) {
     const v = Math.round(at.y(i * y.step)) + .5;
     pen.moveTo(left, v);
     pen.lineTo(right, v);
-    pen.fillText(fixed(i * y.step, decimals(y.step)), left - 6, v);
+    pen.fillText(y.text ? y.text(i * y.step) : fixed(i * y.step, decimals(y.step)), left - 6, v);
   }
   pen.textAlign = 'center';
   pen.textBaseline = 'top';

@@ -3,13 +3,16 @@
 
 import {postJson} from './api.js';
 import {element} from './elements.js';
+import {frozen} from './freeze.js';
 import {cross, forgetDirection, mark, moveCross, sayMarker} from './marker.js';
 import {drawPicture, picture} from './picture.js';
+import {sayReference} from './reference.js';
 import {record} from './stream.js';
 
 async function choose(u, v) {
   if (!picture) return;
   const {frame} = picture;
+  const shown = frozen ?? record;
   let answer;
   try {
     const {directions} = await postJson('/api/v1/direction', {frame, pixels: [[u, v]]});
@@ -21,9 +24,10 @@ async function choose(u, v) {
     forgetDirection(`No direction: ${answer.error}`);
   } else {
     // One shown pixel is what a click is off by, beside what the direction is.
-    const click = picture.overlay.width / element('picture').clientWidth / record.focal_length_px;
+    const click = picture.overlay.width / element('picture').clientWidth / shown.focal_length_px;
     mark(frame, u, v, answer, click);
     sayMarker(picture.overlay);
+    sayReference(answer, shown.localized !== null);
   }
   drawPicture();
 }

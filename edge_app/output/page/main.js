@@ -2,7 +2,9 @@
 // The README of this folder says how its files become one page.
 
 import {showStatusForEver} from './health.js';
+import {drawHour, showHourForEver} from './hour.js';
 import {showLink} from './link.js';
+import {showManualLink} from './manual.js';
 import {drawPicture, showPicturesForEver} from './picture.js';
 import {drawPlan} from './plan.js';
 import {drawPlots} from './plots.js';
@@ -30,11 +32,18 @@ setInterval(showAll, 250);
 for (const event of ['resize', 'visibilitychange']) {
   window.addEventListener(event, () => {
     drawAll();
+    drawHour();
     drawPicture();
   });
 }
-matchMedia('(prefers-color-scheme: dark)').addEventListener('change', drawAll);
+matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => {
+  drawAll();
+  drawHour();
+});
 drawAll();
+drawHour();
+showManualLink();
 followForEver();
 showPicturesForEver();
 showStatusForEver();
+showHourForEver();

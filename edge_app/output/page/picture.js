@@ -16,6 +16,10 @@ const kPictureInterval = 200;  // ms
 
 export let picture = null;  // {frame, bitmap, overlay, targets}
 
+let kept = false;  // the picture stays as it is
+
+export const keepPicture = (keep) => { kept = keep; };
+
 export function drawPicture() {
   if (!picture) return;
   const {frame, bitmap, overlay} = picture;
@@ -37,9 +41,10 @@ async function showPicture() {
   const frame = Number(response.headers.get('X-Alidade-Frame'));
   const [bitmap, overlay] = await Promise.all([
     response.blob().then(createImageBitmap), getJson(`/api/v1/overlay?frame=${frame}`)]);
-  await followMarker(frame);
+  if (!kept) await followMarker(frame);
   const told = targets ? await getJson(`/api/v1/targets?frame=${frame}`).catch(() => null) : null;
   if (told) await showView(frame, overlay);
+  if (kept) return bitmap.close();
   picture?.bitmap.close();
   picture = {frame, bitmap, overlay, targets: told};
   drawPicture();
@@ -50,7 +55,7 @@ export async function showPicturesForEver() {
   for (;;) {
     const began = performance.now();
     let pause = kPictureInterval;
-    if (connected && !document.hidden && record && record.frame !== null && now() - recordAt < kStale) {
+    if (!kept && connected && !document.hidden && record && record.frame !== null && now() - recordAt < kStale) {
       try {
         await showPicture();
       } catch (error) {

@@ -210,6 +210,61 @@ TEST_F(HttpApiTest, AFrameWithoutAnOrientationHasNoDirectionsAndSaysWhy) {
   EXPECT_THAT(get("/api/v1/calibration"), StartsWith("HTTP/1.1 404 "));
 }
 
+TEST_F(HttpApiTest, TellsTheLastMinuteOrTheLastHour) {
+  for (std::int64_t frame = 0; frame < 2500; ++frame) {  // 100 s
+    OrientationRecord record = record_without_orientation(frame);
+    if (frame < 250) {  // one row of the hour
+      record.orientation = OrientationRecord::Orientation{};
+      record.orientation->sigma_rad = {1e-6, 2e-6, 1e-6};
+      record.telemetry_error = PanTilt<double>{3e-4, 4e-4};
+      record.calibrated = true;
+      record.camera.clock_offset = 0.25;
+    }
+    EXPECT_TRUE(live_.write(record));
+  }
+  const json hour = body_of(get("/api/v1/history?span=hour"));
+  ASSERT_EQ(hour["time_s"].size(), 10U);
+  for (const auto& column : hour) EXPECT_EQ(column.size(), 10U);
+  EXPECT_EQ(hour["sigma_rad"][0], 2e-6);
+  EXPECT_EQ(hour["clock_offset_s"][0], 0.25);
+  EXPECT_EQ(hour["clock_offset_sigma_s"][0], 0.0);
+  EXPECT_NEAR(hour["pan_error_rad"][0].get<double>(), 3e-4, 1e-12);
+  EXPECT_NEAR(hour["tilt_error_rad"][0].get<double>(), 4e-4, 1e-12);
+  for (const char* column :
+       {"sigma_rad", "clock_offset_s", "clock_offset_sigma_s", "pan_error_rad", "tilt_error_rad"})
+    EXPECT_TRUE(hour[column][1].is_null()) << column;
+  EXPECT_GT(body_of(get("/api/v1/history?span=minute"))["time_s"].size(), 400U);
+  EXPECT_GT(body_of(get("/api/v1/history"))["time_s"].size(), 400U);
+  const std::string refusal = get("/api/v1/history?span=day");
+  EXPECT_THAT(refusal, StartsWith("HTTP/1.1 400 "));
+  EXPECT_EQ(body_of(refusal)["error"], "span must be minute or hour");
+}
+
+TEST_F(HttpApiTest, HoldsAFrameAndAnswersWithItsRecord) {
+  OrientationRecord record = record_without_orientation(7);
+  EXPECT_TRUE(live_.write(record));
+  EXPECT_THAT(post("/api/v1/hold", R"({"frame":7})"), StartsWith("HTTP/1.1 409 "));
+  EXPECT_THAT(post("/api/v1/hold", R"({"frame":8})"), StartsWith("HTTP/1.1 404 "));
+  EXPECT_THAT(post("/api/v1/hold", R"({"frames":8})"), StartsWith("HTTP/1.1 400 "));
+  record.frame = 8;
+  record.orientation = OrientationRecord::Orientation{};
+  EXPECT_TRUE(live_.write(record));
+  EXPECT_EQ(post("/api/v1/hold", R"({"frame":8})").substr(0, 12), "HTTP/1.1 200");
+  const json held = body_of(post("/api/v1/hold", "{}"));
+  EXPECT_EQ(held["frame"], 8);
+  EXPECT_EQ(held["time_s"], *record.time_s);
+  // Long after that.
+  record = record_without_orientation(1000);
+  EXPECT_TRUE(live_.write(record));
+  OrientationRecord found;
+  EXPECT_EQ(live_.find(7, &found), FrameSearch::kNotKept);
+  EXPECT_EQ(live_.find(8, &found), FrameSearch::kFound);
+  EXPECT_THAT(post("/api/v1/pixel", R"({"frame":7,"directions":[[1,0,0]]})"),
+              StartsWith("HTTP/1.1 404 "));
+  EXPECT_THAT(post("/api/v1/pixel", R"({"frame":8,"directions":[[1,0,0]]})"),
+              StartsWith("HTTP/1.1 200 "));
+}
+
 TEST_F(HttpApiTest, WithoutAPlaneSaysHowToHaveOne) {
   const std::string answer = get("/api/v1/plane");
   EXPECT_THAT(answer, StartsWith("HTTP/1.1 404 "));

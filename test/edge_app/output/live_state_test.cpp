@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <thread>
 
 #include "edge_app/output/record_sinks.h"
@@ -76,6 +77,31 @@ TEST(LiveState, KeepsNoMoreFramesThanItMay) {
   EXPECT_EQ(state.find(46, &found), FrameSearch::kFound);
 }
 
+TEST(LiveState, HoldsAFrameForAsLongAsNobodyHoldsManyOthers) {
+  LiveState state;
+  write(&state, 0, 3);
+  OrientationRecord held;
+  ASSERT_EQ(state.find(2, &held), FrameSearch::kFound);
+  state.hold(held);
+  write(&state, 4, 500);  // 20 s
+  OrientationRecord found;
+  EXPECT_EQ(state.find(1, &found), FrameSearch::kNotKept);
+  ASSERT_EQ(state.find(2, &found), FrameSearch::kFound);
+  EXPECT_EQ(found.orientation->pan_rad, 2);
+  EXPECT_EQ(state.find_at(*held.time_s, &found), FrameSearch::kNotKept);
+  // Held again it is the newest of those that are held, once.
+  const auto hold_others = [&](std::int64_t from, std::size_t count) {
+    for (std::size_t i = 0; i < count; ++i) state.hold(record(from + static_cast<std::int64_t>(i)));
+  };
+  hold_others(100, LiveState::kMaxHeld - 1);
+  state.hold(held);
+  hold_others(200, LiveState::kMaxHeld - 1);
+  EXPECT_EQ(state.find(2, &found), FrameSearch::kFound);
+  hold_others(300, 1);
+  EXPECT_EQ(state.find(2, &found), FrameSearch::kNotKept);
+  EXPECT_EQ(state.find(200, &found), FrameSearch::kFound);
+}
+
 TEST(LiveState, FindsTheFrameNearestToATimeWithinHalfAPeriod) {
   LiveState state;
   OrientationRecord found;
@@ -122,11 +148,13 @@ TEST(LiveState, ALoneFrameAndOneCloseToAnotherAreFoundWithinAMillisecond) {
 TEST(LiveState, ForgetsFramesWhenTheirClockGoesBack) {
   LiveState state;
   write(&state, 50, 60);
+  state.hold(record(55));
   OrientationRecord back = record(61);
   back.time_s = 1;
   EXPECT_TRUE(state.write(back));
   OrientationRecord found;
   EXPECT_EQ(state.find(60, &found), FrameSearch::kNotKept);
+  EXPECT_EQ(state.find(55, &found), FrameSearch::kNotKept);
   EXPECT_EQ(state.find_at(1, &found), FrameSearch::kFound);
   EXPECT_EQ(found.frame, 61);
 }
@@ -153,6 +181,66 @@ TEST(LiveState, ThinsTheHistoryOutAndKeepsTheLongestLatency) {
   EXPECT_TRUE(state.write(lost(250)));
   EXPECT_FALSE(state.history().back().pan_rad);
   EXPECT_EQ(state.history().back().mode, RecordMode::kNone);
+}
+
+TEST(LiveState, TheHistoriesOfMinuteAndHourAreOfTheSameRecords) {
+  LiveState state;
+  for (std::int64_t frame = 0; frame < 7500; ++frame)  // 5 min
+    EXPECT_TRUE(state.write(record(frame)));
+  EXPECT_EQ(state.history().size(), 501u);
+  const std::vector<HistorySample> hour = state.hour();
+  ASSERT_EQ(hour.size(), 30u);
+  for (std::size_t i = 0; i < hour.size(); ++i) {
+    EXPECT_NEAR(hour[i].time_s, 100 + 10 * static_cast<double>(i), 1e-9);
+    EXPECT_EQ(*hour[i].pan_rad, 250 * static_cast<double>(i));
+  }
+}
+
+TEST(RecordHistory, ARowHasTheWorstOfItsRecordsAndTheMeanSquareOfTelemetrysErrors) {
+  RecordHistory history(60, 10);
+  constexpr auto kOffset = static_cast<std::size_t>(Parameter::kClockOffset);
+  OrientationRecord one = record(0);
+  one.orientation->sigma_rad = {1e-6, 3e-6, 2e-6};
+  history.add(one);
+  one = record(1);
+  one.mode = RecordMode::kOe;
+  one.orientation->sigma_rad = {1e-6, 1e-6, 2e-6};
+  one.telemetry_error = PanTilt<double>{3e-4, -1e-4};
+  one.calibrated = true;
+  one.camera.clock_offset = -0.08;
+  one.camera.covariance[kOffset * kParameterCount + kOffset] = 4e-6;
+  history.add(one);
+  one.telemetry_error = PanTilt<double>{-4e-4, -1e-4};
+  one.camera.clock_offset = -0.09;
+  one.time_s = *one.time_s + 1;
+  history.add(one);
+  // The second row has no orientation and no calibration.
+  history.add(lost(*one.time_s + 20));
+  const std::vector<HistorySample> rows = history.samples();
+  ASSERT_EQ(rows.size(), 2u);
+  EXPECT_EQ(rows[0].mode, RecordMode::kPt);
+  EXPECT_EQ(rows[0].sigma_rad, 3e-6);
+  ASSERT_TRUE(rows[0].telemetry_error);
+  EXPECT_NEAR(rows[0].telemetry_error->pan, std::sqrt(12.5) * 1e-4, 1e-12);
+  EXPECT_NEAR(rows[0].telemetry_error->tilt, 1e-4, 1e-12);
+  EXPECT_EQ(rows[0].clock_offset_s, -0.09);
+  EXPECT_EQ(rows[0].clock_offset_sigma_s, 2e-3);
+  EXPECT_FALSE(rows[1].sigma_rad);
+  EXPECT_FALSE(rows[1].telemetry_error);
+  EXPECT_FALSE(rows[1].clock_offset_s);
+  EXPECT_FALSE(rows[1].clock_offset_sigma_s);
+}
+
+TEST(RecordHistory, ForgetsWhatIsTooOldAndAllIfTimeGoesBack) {
+  RecordHistory history(60, 10);
+  for (int second = 0; second <= 200; ++second) history.add(lost(second));
+  const std::vector<HistorySample> rows = history.samples();
+  ASSERT_EQ(rows.size(), 7u);
+  EXPECT_EQ(rows.front().time_s, 140);
+  EXPECT_EQ(rows.back().time_s, 200);
+  history.add(lost(199));
+  ASSERT_EQ(history.samples().size(), 1u);
+  EXPECT_EQ(history.samples().front().time_s, 199);
 }
 
 TEST(LiveState, SaysSinceWhenTheCalibrationIsInUse) {

@@ -523,6 +523,31 @@ TEST_F(OeStepTest, BeginsWithTelemetryAndThenHoldsToLandmarks) {
   }
 }
 
+// Telemetry that jumps by less than contradicts landmarks.
+TEST_F(OeStepTest, TellsWhatTelemetryIsOffFromLandmarks) {
+  EXPECT_FALSE(add(scene_.image()).telemetry_error) << "not in mode OE";
+  build_map();
+  const OrientationRecord before = add(scene_.image());
+  ASSERT_EQ(before.mode, RecordMode::kOe);
+  ASSERT_TRUE(before.telemetry_error);
+  EXPECT_NEAR(before.telemetry_error->pan, 0, 2e-5);
+  EXPECT_NEAR(before.telemetry_error->tilt, 0, 2e-5);
+  rest_.pan_0 += 1e-4;
+  rest_.tilt_0 -= 5e-5;
+  static_cast<void>(add(scene_.image()));
+  const OrientationRecord after = add(scene_.image());
+  ASSERT_EQ(after.mode, RecordMode::kOe);
+  ASSERT_TRUE(after.telemetry_error);
+  EXPECT_NEAR(after.telemetry_error->pan, rest_.pan_0 - after.orientation->pan_rad, 1e-6);
+  EXPECT_NEAR(after.telemetry_error->tilt, rest_.tilt_0 - after.orientation->tilt_rad, 1e-6);
+  EXPECT_GT(after.telemetry_error->pan, 3e-5);
+  OrientationRecord alone;
+  for (int i = 0; i < 6; ++i) alone = add(scene_.image(), false);
+  EXPECT_EQ(alone.mode, RecordMode::kOe);
+  EXPECT_EQ(alone.status, RecordStatus::kTelemetryTooOld);
+  EXPECT_FALSE(alone.telemetry_error);
+}
+
 // A map from before a restart knows the base to a fraction of what one answer of telemetry does. By how much the base was
 // moved meanwhile nobody tells: from what no telemetry shows at once to what contradicts it.
 TEST_F(OeStepTest, NoAnswerIsConfidentlyWrongWhereTheBaseWasMovedWhileTheProgramWasAway) {
