@@ -17,7 +17,9 @@ bool first_item(Source& source, double wait_s, const IsWanted& is_wanted, Item* 
                 std::string* error) {
   const double end_s = monotonic_now_s() + wait_s;
   int failures = 0;
-  for (double left_s = wait_s; left_s > 0; left_s = end_s - monotonic_now_s()) {
+  while (true) {
+    const double left_s = end_s - monotonic_now_s();
+    if (!(left_s > 0)) break;
     switch (source.read(*item, left_s)) {
       case ReadStatus::kOk:
         if (is_wanted(*item)) return true;

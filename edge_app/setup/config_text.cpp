@@ -89,8 +89,10 @@ std::string ConfigText::text(const std::vector<std::string>& comment) const {
   std::string text;
   for (const std::string& line : comment) text += "# " + line + "\n";
   for (const Section& section : sections_) {
-    text += (text.empty() ? "" : "\n") + section.name + ":\n";
-    for (const auto& [key, value] : section.keys) text += "  " + key + ": " + value + "\n";
+    if (!text.empty()) text += '\n';
+    text.append(section.name).append(":\n");
+    for (const auto& [key, value] : section.keys)
+      text.append("  ").append(key).append(": ").append(value).append("\n");
   }
   return text;
 }

@@ -70,7 +70,7 @@ std::string to_set(const VideoStream& stream) {
 }
 
 std::string why_not(const VideoStream& stream, const VideoStream& best) {
-  const std::string reason = obstacle(stream);
+  std::string reason = obstacle(stream);
   if (!reason.empty()) return reason;
   const double pixels = static_cast<double>(stream.width) * stream.height;
   if (pixels > kMostPixels) return "more pixels than a small computer follows in time";

@@ -141,9 +141,11 @@ void FoundDevices::add(const DnsService& service, const AnswerOrigin& origin) {
   const std::string port = service.port == 0 || service.port == usual
                                ? std::string()
                                : ":" + std::to_string(service.port);
-  for (const std::string& address : service.addresses)
-    addresses.push_back(scheme + url_host(address, origin.interface) + port);
-  addresses.push_back(scheme + url_host(without_zone(origin.address), origin.interface) + port);
+  const auto add = [&](const std::string& host) {
+    addresses.push_back(std::string(scheme).append(url_host(host, origin.interface)).append(port));
+  };
+  for (const std::string& address : service.addresses) add(address);
+  add(without_zone(origin.address));
   int rank = kOfTheAnswer;
   std::string url = best_address(addresses, origin, &rank);
   if (url.empty()) return;

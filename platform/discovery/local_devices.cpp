@@ -37,12 +37,16 @@ std::vector<std::string> names_in(const std::string& folder) {
   return names;
 }
 
+std::string path_in(const std::string& folder, const std::string& name) {
+  return std::string(folder).append("/").append(name);
+}
+
 // Device file -> its link in a folder by-id, whose name stays when it is plugged in elsewhere.
 std::map<std::string, std::string> stable_names(const std::string& folder) {
   std::map<std::string, std::string> names;
   for (const std::string& name : names_in(folder)) {
     std::error_code error;
-    const std::string link = folder + "/" + name;
+    const std::string link = path_in(folder, name);
     const fs::path node = fs::canonical(link, error);
     if (!error) names.emplace(node.string(), link);
   }
@@ -75,7 +79,8 @@ std::string hardware_name(const fs::path& device) {
   for (int level = 0; !error && level < 6 && above.has_relative_path(); ++level) {
     const std::string product = first_line(above / "product");
     const std::string maker = first_line(above / "manufacturer");
-    if (!product.empty()) return maker.empty() ? product : maker + " " + product;
+    if (!product.empty())
+      return maker.empty() ? product : std::string(maker).append(" ").append(product);
     above = above.parent_path();
   }
   const fs::path driver = fs::read_symlink(device / "driver", error);
@@ -97,7 +102,7 @@ std::vector<VideoDevice> list_video_devices(const std::string& dev) {
   for (const std::string& name : names_in(dev)) {
     if (!begins_with_digits_behind(name, "video") || devices.size() == kMostDeviceFiles) continue;
     VideoDevice device;
-    device.node = dev + "/" + name;
+    device.node = path_in(dev, name);
     device.path = path_of(by_id, device.node);
     V4l2Device opened;
     switch (opened.survey(device.node, &device.name, &device.offers)) {
@@ -122,7 +127,7 @@ std::vector<SerialPort> list_serial_ports(const std::string& dev, const std::str
     std::error_code ignored;
     if (!fs::exists(device, ignored) || ports.size() == kMostDeviceFiles) continue;
     SerialPort port;
-    port.node = dev + "/" + name;
+    port.node = path_in(dev, name);
     if (!fs::exists(port.node, ignored)) continue;
     const FileDescriptor opened(
         ::open(port.node.c_str(), O_RDWR | O_NONBLOCK | O_NOCTTY | O_CLOEXEC));

@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cmath>
 #include <cstring>
 #include <utility>
 
@@ -54,7 +55,7 @@ double frequency(const v4l2_fract& period) {
 
 v4l2_fract period_of(double rate_hz) {
   constexpr std::uint32_t kParts = 10'000;  // a rate of 29.97 is 10000/299700
-  return {kParts, static_cast<std::uint32_t>(rate_hz * kParts + 0.5)};
+  return {kParts, static_cast<std::uint32_t>(std::lround(rate_hz * kParts))};
 }
 
 }  // namespace
