@@ -249,7 +249,7 @@ TEST_F(VirtualCameraConfig, FollowsACsvPathThroughItsPointsAndAcrossHalfATurn) {
 TEST_F(VirtualCameraConfig, AnotherSizeIsTheSameCamera) {
   const Config before = load(
       "image: {width: 1280, height: 720}\n"
-      "camera: {line_delay_us: -14.2, radial_distortion: 3}\n"
+      "camera: {line_delay_us: -14.2}\n"
       "zoom: {focal_length_px: {wide: 1200, tele: 24000}, centre_px: [4, -3], path: {type: dwell, "
       "stops: [{focal_length_px: 2400, rest_s: 1}]}}\n"
       "guess: {focal_length_px: 1300}\n");
@@ -264,7 +264,13 @@ TEST_F(VirtualCameraConfig, AnotherSizeIsTheSameCamera) {
   EXPECT_DOUBLE_EQ(config.guess_focal_length.value(), 325);
   // Reading out a frame takes as long.
   EXPECT_DOUBLE_EQ(config.camera.line_delay * 180, before.camera.line_delay * 720);
-  EXPECT_DOUBLE_EQ(config.camera.radial_distortion, 3);
+
+  Config fixed = load(
+      "image: {width: 1280, height: 720}\n"
+      "camera: {focal_length_px: 5000, radial_distortion: 3}\n");
+  resize("320x180", &fixed);
+  EXPECT_DOUBLE_EQ(fixed.camera.focal_length, 1250);
+  EXPECT_DOUBLE_EQ(fixed.camera.radial_distortion, 3);
   for (const char* size : {"", "320", "320x", "x180", "0x0", "320x180x", "9999x9999"}) {
     EXPECT_THROW(resize(size, &config), ConfigError) << size;
   }
