@@ -1,10 +1,8 @@
 #include "edge_app/commands/terminal_prompt.h"
 
 #include <openssl/crypto.h>
-#include <openssl/evp.h>
 #include <unistd.h>
 
-#include <array>
 #include <cstdio>
 #include <iostream>
 
@@ -23,13 +21,13 @@ std::optional<std::string> ask(const std::string& question) {
   return std::string(trimmed(line, " \t\r"));
 }
 
+// OpenSSL's EVP_read_pw_string() asks before it switches the echo off: what is typed at once is shown.
 std::optional<std::string> ask_secret(const std::string& question) {
-  std::array<char, 256> text{};
-  const int failed = EVP_read_pw_string_min(text.data(), 0, static_cast<int>(text.size()) - 1,
-                                            question.c_str(), 0);
-  const std::string secret = text.data();
-  OPENSSL_cleanse(text.data(), text.size());
-  return failed == 0 ? std::optional(secret) : std::nullopt;
+  char* const typed = ::getpass(question.c_str());
+  if (typed == nullptr) return std::nullopt;
+  std::string secret = typed;
+  OPENSSL_cleanse(typed, secret.size());
+  return secret;
 }
 
 }  // namespace alidade
