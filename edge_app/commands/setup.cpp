@@ -141,13 +141,7 @@ Json write(const std::string& path, const Json& body) {
 }
 
 ServerResponse setup_page() {
-  ServerResponse response;
-  response.type = "text/html; charset=utf-8";
-  response.body = setup_page_text();
-  response.headers = {{"Content-Security-Policy", kSetupPagePolicy},
-                      {"Cache-Control", "no-cache"},
-                      {"Referrer-Policy", "no-referrer"}};
-  return response;
+  return http_page("text/html; charset=utf-8", setup_page_text(), kSetupPagePolicy);
 }
 
 }  // namespace

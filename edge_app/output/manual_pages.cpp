@@ -74,14 +74,10 @@ ServerResponse manual_page(const std::string& folder, std::string path) {
   if (failed ||
       std::mismatch(root.begin(), root.end(), file.begin(), file.end()).first != root.end())
     return no_such_page();
-  ServerResponse response;
+  std::string body;
   std::string error;
-  if (!read_file(file, &response.body, &error, kMostBytes)) return no_such_page();
-  response.type = type;
-  response.headers = {{"Content-Security-Policy", kPolicy},
-                      {"Cache-Control", "no-cache"},
-                      {"Referrer-Policy", "no-referrer"}};
-  return response;
+  if (!read_file(file, &body, &error, kMostBytes)) return no_such_page();
+  return http_page(type, std::move(body), kPolicy);
 }
 
 ServerResponse to_the_root() {

@@ -23,13 +23,7 @@ ServerResponse no_image() {
 }
 
 ServerResponse page() {
-  ServerResponse response;
-  response.type = "text/html; charset=utf-8";
-  response.body = status_page_text();
-  response.headers = {{"Content-Security-Policy", kStatusPagePolicy},
-                      {"Cache-Control", "no-cache"},
-                      {"Referrer-Policy", "no-referrer"}};
-  return response;
+  return http_page("text/html; charset=utf-8", status_page_text(), kStatusPagePolicy);
 }
 
 std::optional<ServerResponse> image(ImageTap* tap, const ServerRequest& request) {

@@ -1,6 +1,7 @@
 #include "edge_app/output/http/http_message.h"
 
 #include <nlohmann/json.hpp>
+#include <utility>
 
 namespace alidade {
 
@@ -18,6 +19,16 @@ ServerResponse http_error(int status, const std::string& line) {
   using Json = nlohmann::json;
   const std::string text = Json(line).dump(-1, ' ', true, Json::error_handler_t::replace);
   response.body = "{\"error\":" + text + "}\n";
+  return response;
+}
+
+ServerResponse http_page(const char* type, std::string body, const char* policy) {
+  ServerResponse response;
+  response.type = type;
+  response.body = std::move(body);
+  response.headers = {{"Content-Security-Policy", policy},
+                      {"Cache-Control", "no-cache"},
+                      {"Referrer-Policy", "no-referrer"}};
   return response;
 }
 

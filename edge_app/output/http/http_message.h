@@ -42,6 +42,9 @@ struct ServerResponse {
 // {"error": line}
 [[nodiscard]] ServerResponse http_error(int status, const std::string& line);
 
+// For a browser, which is to ask again each time. policy: its Content-Security-Policy.
+[[nodiscard]] ServerResponse http_page(const char* type, std::string body, const char* policy);
+
 // Handlers run on several threads at the same time and must not wait. An empty result: there is no
 // answer yet; the handler is called again some milliseconds later.
 using HttpHandler = std::function<std::optional<ServerResponse>(const ServerRequest&)>;
