@@ -14,6 +14,7 @@
 #include "edge_app/commands/camera_setup.h"
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/terminal_prompt.h"
+#include "platform/system/text.h"
 #include "platform/system/whole_file.h"
 
 namespace alidade {
@@ -26,10 +27,7 @@ std::string password_in(const std::string& file) {
   std::string error;
   if (!read_file(file, &text, &error))
     throw CommandError(kExitUsage, error + "; put the password there");
-  std::string line = text.substr(0, text.find('\n'));
-  line.erase(line.find_last_not_of(" \t\r") + 1);
-  line.erase(0, line.find_first_not_of(" \t"));
-  return line;
+  return std::string(first_line(text));
 }
 
 std::string wanted_password(const DiscoverOptions& options) {

@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <filesystem>
 
+#include "platform/system/text.h"
 #include "platform/system/whole_file.h"
 
 namespace alidade {
@@ -100,11 +101,7 @@ std::string first_line_of(const YamlSection& section, const std::string& key,
   if (text.empty()) {
     section.fail(key, fmt::format("cannot read a line of {}; put the {} there", file, what));
   }
-  std::string line = text.substr(0, text.find('\n'));
-  const char* blanks = " \t\r";
-  line.erase(0, line.find_first_not_of(blanks));
-  line.erase(line.find_last_not_of(blanks) + 1);
-  return line;
+  return std::string(first_line(text));
 }
 
 bool is_loopback(const std::string& host) {

@@ -65,11 +65,11 @@ bool begins_with_digits_behind(const std::string& name, const std::string& begin
          name.find_first_not_of("0123456789", beginning.size()) == std::string::npos;
 }
 
-std::string first_line(const fs::path& file) {
+std::string line_in(const fs::path& file) {
   std::ifstream stream(file);
   std::string line;
   std::getline(stream, line);
-  return std::string(trimmed(line, " \t\r\n"));
+  return std::string(first_line(line));
 }
 
 // "FTDI FT232R USB UART" of the nearest USB device above; else the driver's name.
@@ -77,8 +77,8 @@ std::string hardware_name(const fs::path& device) {
   std::error_code error;
   fs::path above = fs::canonical(device, error);
   for (int level = 0; !error && level < 6 && above.has_relative_path(); ++level) {
-    const std::string product = first_line(above / "product");
-    const std::string maker = first_line(above / "manufacturer");
+    const std::string product = line_in(above / "product");
+    const std::string maker = line_in(above / "manufacturer");
     if (!product.empty())
       return maker.empty() ? product : std::string(maker).append(" ").append(product);
     above = above.parent_path();

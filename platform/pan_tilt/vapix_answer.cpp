@@ -12,15 +12,13 @@ namespace {
 
 constexpr std::string_view kBlanks = " \t\r";
 
-std::string first_line(std::string_view text) {
-  return shown(trimmed(text.substr(0, text.find('\n')), kBlanks));
-}
+std::string shown_line(std::string_view text) { return shown(first_line(text)); }
 
 }  // namespace
 
 bool parse_vapix_position(std::string_view body, VapixPosition* position, std::string* error) {
-  if (trimmed(body.substr(0, body.find('\n')), kBlanks).substr(0, 6) == "Error:") {
-    *error = "the camera answers '" + first_line(body) + "'";
+  if (first_line(body).substr(0, 6) == "Error:") {
+    *error = "the camera answers '" + shown_line(body) + "'";
     return false;
   }
   std::optional<double> pan_deg;
@@ -43,13 +41,13 @@ bool parse_vapix_position(std::string_view body, VapixPosition* position, std::s
     }
     *target = parse_number(trimmed(line.substr(equals + 1), kBlanks));
     if (!*target) {
-      *error = "'" + first_line(line) + "' in the position is not a number";
+      *error = "'" + shown_line(line) + "' in the position is not a number";
       return false;
     }
   }
   for (const auto& [name, angle] : {std::pair("pan", &pan_deg), std::pair("tilt", &tilt_deg)}) {
     if (!*angle) {
-      *error = std::string("no ") + name + " in the answer '" + first_line(body) +
+      *error = std::string("no ") + name + " in the answer '" + shown_line(body) +
                "'; expected lines pan=, tilt=, zoom=";
       return false;
     }

@@ -19,6 +19,11 @@ namespace alidade {
              : text.substr(first, text.find_last_not_of(blanks) - first + 1);
 }
 
+// Without the blanks around it.
+[[nodiscard]] inline std::string_view first_line(std::string_view text) {
+  return trimmed(text.substr(0, text.find('\n')), " \t\r");
+}
+
 // Parses as strtod does. nullopt if text as a whole is not a number, or not a finite one.
 [[nodiscard]] inline std::optional<double> parse_number(std::string_view text) {
   const std::string copy(text);  // strtod needs the terminating null
