@@ -1,7 +1,6 @@
 #include "core/calibration/staged_adjustment.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdio>

@@ -6,6 +6,7 @@
 #include <thread>
 #include <vector>
 
+#include "core/model/trigonometry.h"
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/link_trial.h"
 #include "platform/discovery/onvif_inquiry.h"
@@ -16,7 +17,7 @@ namespace alidade {
 namespace {
 
 constexpr std::size_t kAskedAtOnce = 16;
-constexpr double kDegrees = 180 / 3.14159265358979323846;
+constexpr double kDegrees = 180 / kPi;
 
 bool is_device_file(const std::string& device) { return !device.empty() && device[0] == '/'; }
 
