@@ -12,7 +12,6 @@
 #include <limits>
 #include <mutex>
 #include <nlohmann/json.hpp>
-#include <random>
 #include <set>
 
 #include "edge_app/commands/camera_search.h"
@@ -22,6 +21,7 @@
 #include "edge_app/output/http/http_server.h"
 #include "edge_app/output/json_query.h"
 #include "edge_app/setup/setup_page.h"
+#include "platform/system/random.h"
 
 namespace alidade {
 namespace {
@@ -31,14 +31,6 @@ using Json = nlohmann::ordered_json;
 constexpr std::size_t kMostBody = 16384;
 constexpr std::size_t kMostKeys = 64;
 constexpr double kSearch_s = 4;
-
-std::string new_token() {
-  std::random_device random;
-  std::uniform_int_distribution<int> digit(0, 15);
-  std::string token;
-  for (int i = 0; i < 32; ++i) token += "0123456789abcdef"[digit(random)];
-  return token;
-}
 
 std::string own_name() {
   std::array<char, 256> name{};
@@ -152,7 +144,7 @@ int set_up_in_browser(const SetupOptions& options) {
   refuse_existing_files(setup);
   HttpServerOptions http;
   http.port = options.port;
-  http.token = new_token();
+  http.token = random_hex(32);
   const auto desk = std::make_shared<Desk>();
   HttpServer server(http);
   server.get("/", HttpAccess::kOpen, [](const ServerRequest&) { return setup_page(); });

@@ -5,18 +5,13 @@
 #include <algorithm>
 #include <cmath>
 #include <mutex>
-#include <random>
 
 #include "edge_app/record/record_format.h"
 #include "platform/system/clock.h"
+#include "platform/system/random.h"
 
 namespace alidade {
 namespace {
-
-std::string make_start_id() {
-  std::random_device random;
-  return fmt::format("{:08x}{:08x}", random(), random());
-}
 
 bool same(const PlainCalibration& a, const PlainCalibration& b) {
   static_assert(kDistortionCount == 1, "each term is compared");
@@ -31,7 +26,7 @@ bool same(const PlainCalibration& a, const PlainCalibration& b) {
 
 LiveState::LiveState(const LiveStateOptions& options)
     : options_(options),
-      start_id_(make_start_id()),
+      start_id_(random_hex(16)),
       started_s_(monotonic_now_s()),
       minute_(options.minute_s, options.minute_step_s),
       hour_(options.hour_s, options.hour_step_s) {}

@@ -16,7 +16,7 @@ using Counts = std::vector<std::optional<std::int64_t>>;
 
 // Keeps only the longest part without a reconnection.
 template <class Item>
-void keep_longest_part(const char* what, std::vector<Item>* items,
+void keep_longest_part(const char* stream, const char* unit, std::vector<Item>* items,
                        std::vector<std::string>* remarks) {
   std::size_t best_begin = 0;
   std::size_t best_end = 0;
@@ -31,9 +31,9 @@ void keep_longest_part(const char* what, std::vector<Item>* items,
   }
   if (best_end - best_begin == items->size()) return;
   remarks->push_back(
-      fmt::format("{}: the connection was lost; the longest part without that is "
-                  "used, {} of {}",
-                  what, best_end - best_begin, items->size()));
+      fmt::format("the connection of the {} was lost; the longest part without that is used, {} "
+                  "of {} {}",
+                  stream, best_end - best_begin, items->size(), unit));
   *items = std::vector<Item>(items->begin() + static_cast<std::ptrdiff_t>(best_begin),
                              items->begin() + static_cast<std::ptrdiff_t>(best_end));
 }
@@ -118,7 +118,7 @@ Counts count_items(const std::vector<Item>& items, Sequence sequence, SenderTime
 
 void add_frames(std::vector<FrameStamp> stamps, CalibrationInput* input,
                 CalibrationOptions* options, std::vector<std::string>* remarks) {
-  keep_longest_part("frames.csv", &stamps, remarks);
+  keep_longest_part("video", "frames", &stamps, remarks);
   const Counts counts = count_items(
       stamps, [](const FrameStamp& stamp) { return stamp.sequence; },
       [](const FrameStamp& stamp) { return stamp.sender_time_s; });
@@ -144,7 +144,7 @@ void add_telemetry(std::vector<PanTiltSample> samples, CalibrationInput* input,
                    CalibrationOptions* options, std::vector<std::string>* remarks) {
   const bool polled = is_polled(samples);
   // Polled samples have the host's times, which go on over a reconnection.
-  if (!polled) keep_longest_part("telemetry.csv", &samples, remarks);
+  if (!polled) keep_longest_part("telemetry", "samples", &samples, remarks);
   const Counts counts = count_items(
       samples, [](const PanTiltSample& sample) { return sample.sequence; },
       [](const PanTiltSample& sample) { return sample.device_time_s; });
@@ -152,7 +152,7 @@ void add_telemetry(std::vector<PanTiltSample> samples, CalibrationInput* input,
   const auto stale_count = std::count(stale.begin(), stale.end(), true);
   if (stale_count > 0) {
     remarks->push_back(
-        fmt::format("telemetry.csv: {} of {} samples repeat an old angle while the head turns; "
+        fmt::format("{} of {} samples of telemetry repeat an old angle while the head turns; "
                     "they are left out",
                     stale_count, samples.size()));
   }

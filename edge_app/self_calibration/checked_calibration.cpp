@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <iterator>
 #include <optional>
 #include <unordered_map>
 #include <utility>
@@ -129,9 +130,9 @@ CheckedCalibration calibrate_session(const CalibrationSession& session,
     adjustment.progress = [&options](double, const char*) { return !options.is_cancelled(); };
   }
   const std::vector<FrameStamp> stamps = session.stamps();
-  std::vector<std::string> remarks;
-  add_frames(stamps, &input, &adjustment, &remarks);
-  add_telemetry(session.telemetry(), &input, &adjustment, &remarks);
+  CheckedCalibration checked;
+  add_frames(stamps, &input, &adjustment, &checked.remarks);
+  add_telemetry(session.telemetry(), &input, &adjustment, &checked.remarks);
   // The error common to all polls is not averaged out by several calibrations. It is added to the
   // result instead.
   const double common_s = std::exchange(input.noise.telemetry_common_sigma_s, 0.0);
@@ -140,12 +141,12 @@ CheckedCalibration calibrate_session(const CalibrationSession& session,
   input.observations = choose_tracks(session.observations(), options.max_observations);
   const std::vector<CalibrationObservation> held_out = take_held_out(stamps, &input.observations);
 
-  CheckedCalibration checked;
   // A published calibration already contains what is known of the camera.
   KnownCameraCalibration calibrated =
       calibrate_knowing(input, adjustment, known == nullptr ? options.camera : KnownCamera());
   checked.result = std::move(calibrated.result);
-  checked.remarks = std::move(calibrated.remarks);
+  checked.remarks.insert(checked.remarks.end(), std::make_move_iterator(calibrated.remarks.begin()),
+                         std::make_move_iterator(calibrated.remarks.end()));
   CalibrationResult& result = checked.result;
   if (!result.ok()) {
     checked.refusal = result.message;

@@ -55,7 +55,7 @@ struct CheckedCalibration {
   CalibrationResult result;        // calibration.zoom is not set
   std::string refusal;             // empty: it may be published
   std::optional<double> hold_out;  // held_out_error(); empty: nothing could be compared
-  // What of options.camera was not used, and why; not what was left out of the session's data.
+  // What of the session's data was left out, and what of options.camera was not used, and why.
   std::vector<std::string> remarks;
   // Set only if result.ok():
   CalibrationOptions adjustment;    // as used, with its priors

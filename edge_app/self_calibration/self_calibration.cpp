@@ -213,7 +213,8 @@ void SelfCalibration::store(const CalibrationResult& result, const MapState& map
   stored.notes.far_focal_length = result.far_focal_length();
   stored.map = map;
   std::string error;
-  if (!archive_->save(stored, &error)) messages_.say(error + "; kept, will be tried again");
+  if (archive_->save(stored, &error)) return;
+  messages_.say(archive_->has_pending() ? error + "; kept, will be tried again" : error);
 }
 
 void SelfCalibration::publish(const CheckedCalibration& checked) {

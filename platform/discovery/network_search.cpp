@@ -14,10 +14,11 @@
 #include <cmath>
 #include <cstring>
 #include <memory>
-#include <random>
+#include <string>
 
 #include "platform/system/clock.h"
 #include "platform/system/file_descriptor.h"
+#include "platform/system/random.h"
 #include "platform/system/shown.h"
 #include "platform/system/text.h"
 
@@ -39,14 +40,9 @@ const std::vector<std::string>& vapix_services() {
 
 // A version 4 UUID.
 std::string new_uuid() {
-  std::random_device random;
-  std::uniform_int_distribution<int> digit(0, 15);
-  constexpr const char* kDigits = "0123456789abcdef";
-  std::string uuid = "xxxxxxxx-xxxx-4xxx-8xxx-xxxxxxxxxxxx";
-  for (char& c : uuid) {
-    if (c == 'x') c = kDigits[digit(random)];
-  }
-  return uuid;
+  const std::string digits = random_hex(30);
+  return digits.substr(0, 8) + "-" + digits.substr(8, 4) + "-4" + digits.substr(12, 3) + "-8" +
+         digits.substr(15, 3) + "-" + digits.substr(18, 12);
 }
 
 struct Place {
@@ -266,8 +262,7 @@ NetworkSearchResult Search::run(const NetworkSearchOptions& options) {
   // Some devices want "urn:uuid:", others answer to "uuid:" only.
   message_ids_ = {"uuid:" + new_uuid(), "urn:uuid:" + new_uuid()};
   onvif_.messages = {probe_message(message_ids_[0], true), probe_message(message_ids_[1], false)};
-  std::random_device random;
-  dns_id_ = std::uniform_int_distribution<std::uint16_t>(1, 0xFFFF)(random);
+  dns_id_ = static_cast<std::uint16_t>(std::stoul(random_hex(4), nullptr, 16) | 1U);
   vapix_.is_dns = true;
   vapix_.messages = {dns_sd_question(vapix_services(), dns_id_)};
 

@@ -3,20 +3,18 @@
 #include <strings.h>
 
 #include <algorithm>
-#include <random>
 
 #include "platform/discovery/http_question.h"
 #include "platform/discovery/onvif_media.h"
 #include "platform/pan_tilt/onvif_addresses.h"
 #include "platform/pan_tilt/onvif_login.h"
 #include "platform/system/clock.h"
+#include "platform/system/random.h"
 #include "platform/system/shown.h"
 #include "platform/system/url.h"
 
 namespace alidade {
 namespace {
-
-constexpr std::size_t kNonceBytes_ = 16;
 
 class OnvifInquiry {
  public:
@@ -49,7 +47,6 @@ class OnvifInquiry {
   double timeout_s_;
   OnvifLoginWays ways_;
   std::string refusal_;  // of all ways to log in: then none is tried any more
-  std::random_device random_;
   OnvifServices services_;
   std::string media2_;
   bool is_media2_ = false;  // the streams were found there
@@ -66,8 +63,7 @@ HttpReply OnvifInquiry::send(const std::string& url, const OnvifCall& call,
     token->user = login_.user;
     token->password = login_.password;
     token->created_utc_s = ways_.created_utc_s(monotonic_now_s(), utc_now_s());
-    std::uniform_int_distribution<int> byte(0, 255);
-    for (std::size_t i = 0; i < kNonceBytes_; ++i) token->nonce += static_cast<char>(byte(random_));
+    token->nonce = random_bytes(kOnvifNonceBytes);
   }
   HttpQuestion question;
   question.url = url;

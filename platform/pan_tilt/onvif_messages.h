@@ -6,6 +6,7 @@
 //   GetProfiles                                          media service
 //   GetStatus, GetNodes, GetConfigurationOptions         PTZ service
 
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -13,11 +14,13 @@
 
 namespace alidade {
 
+inline constexpr std::size_t kOnvifNonceBytes = 16;
+
 // WS-UsernameToken: Base64(SHA1(nonce + created + password)), created on the device's clock.
 struct OnvifLogin {
   std::string user;
   std::string password;
-  std::string nonce;         // raw bytes, new for each request
+  std::string nonce;         // kOnvifNonceBytes raw bytes, new for each request
   double created_utc_s = 0;  // Unix time
 };
 

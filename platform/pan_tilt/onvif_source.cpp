@@ -1,6 +1,5 @@
 #include "platform/pan_tilt/onvif_source.h"
 
-#include <random>
 #include <utility>
 
 #include "platform/pan_tilt/device_clock_trial.h"
@@ -8,13 +7,13 @@
 #include "platform/pan_tilt/onvif_login.h"
 #include "platform/pan_tilt/onvif_messages.h"
 #include "platform/system/clock.h"
+#include "platform/system/random.h"
 #include "platform/system/shown.h"
 
 namespace alidade {
 namespace {
 
 constexpr std::size_t kMaxOnvifBody = 256 * 1024;  // bytes; many long profiles
-constexpr std::size_t kNonceBytes = 16;
 
 // The candidate addresses of a service, tried one after the other until it answers.
 class ServiceSearch {
@@ -96,7 +95,6 @@ class OnvifConversation : public HttpConversation {
   std::string user_;
   std::string password_;
   Url device_;  // URL of the device service
-  std::random_device random_;
 
   Step step_ = Step::kClock;
   OnvifLoginWays login_;
@@ -147,10 +145,7 @@ HttpRequest OnvifConversation::next_request(double now_s) {
     login->user = user_;
     login->password = password_;
     login->created_utc_s = login_.created_utc_s(now_s, utc_now_s());
-    std::uniform_int_distribution<int> byte(0, 255);
-    for (std::size_t i = 0; i < kNonceBytes; ++i) {
-      login->nonce += static_cast<char>(byte(random_));
-    }
+    login->nonce = random_bytes(kOnvifNonceBytes);
   }
   HttpRequest request;
   request.url = step_ == Step::kProfile                   ? media_.address()

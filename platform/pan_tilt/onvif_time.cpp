@@ -52,6 +52,10 @@ std::optional<double> unix_time(const CivilTime& civil) {
     return std::nullopt;
   }
   const std::int64_t days = days_from_civil(civil.year, civil.month, civil.day);
+  // Day 31 of a month of 30 would be the first of the next.
+  if (civil.month < 12 && days >= days_from_civil(civil.year, civil.month + 1, 1)) {
+    return std::nullopt;
+  }
   return static_cast<double>(((days * 24 + civil.hour) * 60 + civil.minute) * 60 + civil.second);
 }
 

@@ -4,12 +4,14 @@
 #include <unistd.h>
 #include <yaml-cpp/yaml.h>
 
+#include <array>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
 #include <optional>
 #include <system_error>
+#include <utility>
 
 #include "platform/system/whole_file.h"
 
@@ -30,6 +32,17 @@ std::string text(const std::optional<std::int64_t>& number) {
 
 std::string failure(const std::string& path, int code) {
   return "cannot write " + path + ": " + std::strerror(code);
+}
+
+std::string description(int width, int height, const std::string& notes) {
+  YAML::Emitter yaml;
+  yaml << YAML::BeginMap << YAML::Key << "format" << YAML::Value << 1 << YAML::Key << "width"
+       << YAML::Value << width << YAML::Key << "height" << YAML::Value << height;
+  if (!notes.empty()) {
+    yaml << YAML::Key << "notes" << YAML::Value << YAML::DoubleQuoted << notes;
+  }
+  yaml << YAML::EndMap;
+  return std::string(yaml.c_str()) + "\n";
 }
 
 }  // namespace
@@ -67,23 +80,22 @@ bool RecordingWriter::open(const std::string& directory, int width, int height,
   }
   frames_.path = directory + "/frames.csv";
   telemetry_.path = directory + "/telemetry.csv";
-  if (!create(&frames_, "frame,receive_time_s,sender_time_s,sender_utc_s,sequence,restarted\n",
-              error) ||
-      !create(&telemetry_,
-              "receive_time_s,pan_rad,tilt_rad,zoom,device_time_s,sequence,earliest_time_s,"
-              "restarted\n",
-              error)) {
+  Table info{directory + "/recording.yaml", {}};
+  const std::array<std::pair<Table*, std::string>, 3> files = {
+      {{&frames_, "frame,receive_time_s,sender_time_s,sender_utc_s,sequence,restarted\n"},
+       {&telemetry_,
+        "receive_time_s,pan_rad,tilt_rad,zoom,device_time_s,sequence,earliest_time_s,restarted\n"},
+       {&info, description(width, height, notes)}}};
+  for (const auto& [table, text] : files) {
+    if (create(table, text, error)) continue;
+    // Else the next attempt would be refused because of these.
+    for (const auto& [made, unused] : files) {
+      if (made->file.is_open()) ::unlink(made->path.c_str());
+      made->file.reset();
+    }
     return false;
   }
-  YAML::Emitter yaml;
-  yaml << YAML::BeginMap << YAML::Key << "format" << YAML::Value << 1 << YAML::Key << "width"
-       << YAML::Value << width << YAML::Key << "height" << YAML::Value << height;
-  if (!notes.empty()) {
-    yaml << YAML::Key << "notes" << YAML::Value << YAML::DoubleQuoted << notes;
-  }
-  yaml << YAML::EndMap;
-  Table info{directory + "/recording.yaml", {}};
-  return create(&info, std::string(yaml.c_str()) + "\n", error);
+  return true;
 }
 
 bool RecordingWriter::add_frame(const FrameStamp& stamp, std::string* error) {

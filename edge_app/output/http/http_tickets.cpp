@@ -1,19 +1,13 @@
 #include "edge_app/output/http/http_tickets.h"
 
-#include <fmt/format.h>
-#include <sys/random.h>
-
 #include <algorithm>
-#include <array>
-#include <cstdint>
+
+#include "platform/system/random.h"
 
 namespace alidade {
 
-std::optional<std::string> HttpTickets::issue(double now_s) {
-  std::array<std::uint64_t, 2> bits{};
-  if (::getrandom(bits.data(), sizeof bits, 0) != static_cast<ssize_t>(sizeof bits))
-    return std::nullopt;
-  const std::string text = fmt::format("{:016x}{:016x}", bits[0], bits[1]);
+std::string HttpTickets::issue(double now_s) {
+  std::string text = random_hex(32);
   const std::lock_guard<std::mutex> lock(mutex_);
   forget_the_old(now_s);
   if (tickets_.size() >= kMost) tickets_.pop_front();

@@ -6,7 +6,6 @@
 #include <cstddef>
 #include <deque>
 #include <mutex>
-#include <optional>
 #include <string>
 
 namespace alidade {
@@ -16,8 +15,8 @@ class HttpTickets {
   static constexpr double kValidS = 10;
   static constexpr std::size_t kMost = 1024;  // beyond that the oldest is forgotten
 
-  // A new ticket. now_s: s, monotonic. Empty: the system has no random bits.
-  [[nodiscard]] std::optional<std::string> issue(double now_s);
+  // A new ticket. now_s: s, monotonic.
+  [[nodiscard]] std::string issue(double now_s);
   // Whether the ticket was issued, is still valid and was not used before. Uses it up.
   [[nodiscard]] bool take(const std::string& ticket, double now_s);
 

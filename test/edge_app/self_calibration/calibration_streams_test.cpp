@@ -75,7 +75,8 @@ TEST(CalibrationStreams, ADeviceThatHasNotMeasuredSinceTellsNothingOfALaterTime)
     }
   }
   ASSERT_EQ(told.remarks.size(), 1U);
-  EXPECT_NE(told.remarks[0].find("of 90 samples repeat an old angle"), std::string::npos);
+  EXPECT_NE(told.remarks[0].find("of 90 samples of telemetry repeat an old angle"),
+            std::string::npos);
 }
 
 TEST(CalibrationStreams, AStatedSigmaOfPolledTelemetryStands) {

@@ -15,6 +15,7 @@
 namespace alidade {
 namespace {
 
+using ::testing::Contains;
 using ::testing::Gt;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -24,9 +25,15 @@ using ::testing::Optional;
 // held_out_factor: of the sigmas that the tracker states in the frames that are held out; 0: it
 // finds nothing there.
 // polled_width_s: of the interval in which each angle was asked for; 0: numbered by the device.
+// measured_every: polls; between them the device repeats its angle.
 CalibrationSession session_of(const test::Simulation& s, double held_out_factor,
-                              double polled_width_s = 0) {
-  const CalibrationInput input = test::simulate(s);
+                              double polled_width_s = 0, std::size_t measured_every = 1) {
+  CalibrationInput input = test::simulate(s);
+  for (std::size_t i = 0; i < input.telemetry.size(); ++i) {
+    const CalibrationTelemetry& measured = input.telemetry[i - i % measured_every];
+    input.telemetry[i].pan_rad = measured.pan_rad;
+    input.telemetry[i].tilt_rad = measured.tilt_rad;
+  }
   CalibrationSession session{SessionLimits()};
   for (const CalibrationTelemetry& from : input.telemetry) {
     PanTiltSample sample;
@@ -79,6 +86,13 @@ CheckedCalibration calibrated(double held_out_factor, const Calibration* known =
 double excess_of(const CheckedCalibration& checked) {
   const double unit = std::max(1.0, checked.result.quality.pixel_sigma_ratio);
   return std::max(1.0, checked.hold_out.value_or(0) / unit);
+}
+
+TEST(CheckedCalibration, TellsWhatOfTheTelemetryWasLeftOut) {
+  const test::Simulation s = test::arrival_stamped_camera();
+  const CalibrationSession session = session_of(s, 1, 2e-3, 3);
+  EXPECT_THAT(calibrate_session(session, session_options(s), nullptr).remarks,
+              Contains(HasSubstr("of telemetry repeat an old angle")));
 }
 
 // The sigmas of frames that the adjustment does not see cannot change it: only what these frames say does.

@@ -106,6 +106,18 @@ TEST(RecordingWriter, RefusesADirectoryThatHoldsARecording) {
   EXPECT_EQ(frames.size(), 1U);
 }
 
+TEST(RecordingWriter, WhereItCannotBeginItLeavesNoFileOfItsOwn) {
+  const TemporaryDirectory directory;
+  const std::string mine = directory.write("telemetry.csv", "somebody's\n");
+  std::string error;
+  RecordingWriter writer;
+  EXPECT_FALSE(writer.open(directory.path(), 1, 1, "", &error));
+  EXPECT_THAT(error, HasSubstr("telemetry.csv exists already"));
+  EXPECT_FALSE(std::filesystem::exists(directory.path() + "/frames.csv"));
+  std::filesystem::remove(mine);
+  EXPECT_TRUE(writer.open(directory.path(), 1, 1, "", &error)) << error;
+}
+
 TEST(RecordingWriter, SaysThatTheDirectoryCannotBeMade) {
   const TemporaryDirectory directory;
   directory.write("file", "");
