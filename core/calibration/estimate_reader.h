@@ -1,6 +1,6 @@
 #pragma once
-// EstimateReader: reads strictly (strict_yaml.h) what all files of estimates (calibration.yaml,
-// lens.yaml) have:
+// EstimateReader: strict reader (strict_yaml.h) for what all files of estimates (calibration.yaml,
+// lens.yaml, plane.yaml) have in common (plane.yaml has no image):
 //   format: 1
 //   image: {width: 1920, height: 1080}
 //   NAME: {value: ..., sigma: ...}
@@ -38,18 +38,22 @@ class EstimateReader {
   [[noreturn]] void fail(const YAML::Node& node, const std::string& text) const;
   [[nodiscard]] const YAML::Node& root() const { return root_; }
 
-  // Requires a map with the entry `format: 1` and no other keys than `known`. kind completes
-  // "not ...".
+  // Requires a map that has `format: 1` and only keys that are in `known`. `known` must contain
+  // "format". kind completes "not ...".
   void check_top(const std::string& kind, const std::vector<std::string>& known) const;
-  // prefix, here and below: the path of the map, with a dot at its end.
+  // Requires that `map`, which must be a map, has only keys of `known`, each once. prefix, here
+  // and below: the path of the map in errors, with a dot at its end; empty for the root.
   void check_keys(const YAML::Node& map, const std::vector<std::string>& known,
                   const std::string& prefix) const;
+  // The value of a key. Fails if `map` is no map or has no such key.
   [[nodiscard]] YAML::Node required(const YAML::Node& map, const char* key,
                                     const std::string& prefix) const;
+  // name: the path in errors. Fails unless the node is a finite number (a list of `count` of them).
   [[nodiscard]] double number(const YAML::Node& node, const std::string& name) const;
   [[nodiscard]] std::vector<double> numbers(const YAML::Node& node, const std::string& name,
                                             std::size_t count) const;
 
+  // px; whole numbers from 1 to 100000.
   void read_image(int* width, int* height) const;
   // The map {value, sigma} of this name.
   [[nodiscard]] YAML::Node entry(const std::string& name) const;

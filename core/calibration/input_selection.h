@@ -1,13 +1,12 @@
 #pragma once
-// select_input(): first stage of calibrate(). Selects and orders the usable input.
-//   frames         finite stamp, the first of each name; ordered by sequence number if all have
-//                  one, else by stamp
-//   telemetry      finite; ordered likewise; the first of each sequence number (or else stamp)
-//   observations   finite, sigma > 0, in the image or up to 1 px outside of it, in a used frame
-//                  that shows its landmark once, of a landmark in two frames or more; ordered by
-//                  landmark, then frame
-// Refuses fewer than 3 frames, 8 telemetry samples or kMinLandmarks landmarks, an empty image, and
-// other units: angles beyond 2.5 pi (degrees), normalised coordinates. Allocates.
+// What select_input(), the first stage of calibrate(), keeps, and in which order. Allocates.
+//   frames         with a finite stamp; of several with the same name, the first. Ordered by
+//                  sequence number if all have one, else by stamp
+//   telemetry      finite. Ordered likewise; of several with the same sequence number (or stamp, if
+//                  that is what orders them), the first
+//   observations   finite, sigma > 0, at most 1 px outside the image, in a frame that is kept, of a
+//                  landmark that this frame shows once and another frame, too. Ordered by landmark,
+//                  then frame
 
 #include <cstddef>
 #include <cstdint>
@@ -21,7 +20,7 @@ namespace alidade::internal {
 // The least number of landmarks for the adjustment.
 inline constexpr std::size_t kMinLandmarks = 8;
 
-// The adjustment's data, and the index into the input of each item.
+// The adjustment's data. For each item of the data: its index in CalibrationInput.
 struct SelectedInput {
   AdjustmentData data;
   std::vector<std::size_t> frame_index;        // for data.frame_time_s
@@ -30,8 +29,11 @@ struct SelectedInput {
   std::vector<std::int64_t> landmark_name;     // for each landmark of data.observations
 };
 
-// *selected: empty. Fills the indices, the names and data.observations. Times and telemetry are set
-// later, by fit_clocks() (recording_clocks.h). *excluded counts what is left out.
+// *selected, *excluded: as constructed. Fills the indices, the names and data.observations;
+// fit_clocks() (recording_clocks.h) sets times and telemetry later. *excluded: what is left out.
+// kBadInput: fewer than 3 frames or 8 telemetry samples; width or height not positive; an angle
+// beyond 2.5 pi rad (degrees?); all observations within 2 px of the corner (normalised?).
+// kTooFewLandmarks: fewer than kMinLandmarks. *selected is incomplete after a refusal.
 [[nodiscard]] StageStatus select_input(const CalibrationInput& input, SelectedInput* selected,
                                        CalibrationExclusions* excluded);
 

@@ -5,7 +5,7 @@
 // cube of the control points.
 // Preconditioner: M = [B C^T; C D], with B the control points' block of H (a band, as if landmarks
 // were known), C and D the parameters' rows of S. B minus the same block of S is positive
-// semidefinite, so M is positive definite if S is. Takes some 20 to 40 steps at any length.
+// semidefinite, so M is positive definite if S is. solve() takes some 20 to 40 steps at any length.
 // Allocates. Derivation: docs/calibration.md.
 
 #include <Eigen/Cholesky>
@@ -26,8 +26,9 @@ using OrderedCholesky =
 
 class ReducedEquations {
  public:
-  // Multiplies every diagonal element of H and of the landmarks' blocks by 1 + damping. `in` must
-  // outlive this object. False if a landmark's block or M is not positive definite.
+  // Multiplies every diagonal element of H and of the landmarks' blocks by 1 + damping. `in` is used
+  // by solve(): it must stay as it is until the next set(). False if a landmark's block or M is not
+  // positive definite; solve() must not be called then.
   [[nodiscard]] bool set(const Linearisation& in, double damping);
 
   // The right-hand side with landmarks eliminated: g - Y y.
@@ -47,8 +48,8 @@ class ReducedEquations {
 
   const Linearisation* in_ = nullptr;
   double damping_ = 0;
-  // Y: of the touched control points in sequence, and of the parameters by landmark (zero if not
-  // observed).
+  // Rows of Y: of the control points, in the order of in_->touched; of the parameters, by landmark
+  // (zero if none of its observations is in use).
   std::vector<Matrix2<double>> Y_points_;
   std::vector<CameraRows> Y_camera_;
   Eigen::VectorXd g_;

@@ -4,8 +4,8 @@
 // The values of g at its knots and the width of the play are linear parameters; they act on the
 // telemetry's residuals only. The evidence (departure_evidence.h) says whether they are present,
 // how large and how smooth. Their posterior mean is subtracted from the readings, and their
-// posterior covariance adds to the covariance of all parameters. If nothing is found, nothing
-// changes. Angles rad. Allocates. Derivation: docs/calibration.md.
+// posterior covariance adds to the covariance of all parameters. If nothing is found and no
+// accuracy is claimed, nothing changes. Angles rad. Allocates. Derivation: docs/calibration.md.
 
 #include <Eigen/Core>
 #include <array>
@@ -21,16 +21,18 @@ namespace alidade::internal {
 
 class TelemetryDepartures {
  public:
-  // fixed: the adjustment's. resolution: the step of the readings; 0: none. accuracy: the standard
+  // fixed: as given to Adjustment. resolution: the step of the readings; 0: none. accuracy: the standard
   // deviation that the maker claims for each axis's angles; 0: no claim.
   explicit TelemetryDepartures(const std::array<bool, kGlobalCount>& fixed, double resolution = 0,
                                double accuracy = 0)
       : fixed_(fixed), resolution_(resolution), accuracy_(accuracy) {}
 
-  // Estimates the departures in full. data: the same samples in all calls. state, at: the minimum,
-  // robust or not, with the readings as they are in `data`, the latest estimate subtracted. choose:
-  // the parts that are present are chosen anew; else they stay, but ripples are refined. False if
-  // no part is present and no accuracy is claimed, or if the normal equations have no solution.
+  // Estimates all departures anew, not as a change of the latest estimate. data: the same samples
+  // in all calls, with the latest estimate subtracted by subtract(). state, at: a minimum for
+  // `data`, robust or of least squares. choose: chooses the parts that are present; must be true in
+  // the first call. Otherwise the parts stay, and only ripples are refined (departure_evidence.h).
+  // False if no part is present and no accuracy is claimed, or if the normal equations have no
+  // solution.
   [[nodiscard]] bool estimate(const AdjustmentData& data, const AdjustmentState& state,
                               const Linearisation& at, bool choose, Adjustment* adjustment);
 
@@ -38,10 +40,11 @@ class TelemetryDepartures {
   // to the original ones, larger where the state of the play is not known.
   void subtract(const AdjustmentState& state, const Linearisation& at, AdjustmentData* data);
 
-  // The adjustment now takes this parameter as exact.
+  // To be called when the adjustment begins to take this parameter (index in GlobalVector) as
+  // exact.
   void hold(int parameter) { fixed_[static_cast<std::size_t>(parameter)] = true; }
 
-  // The readings' sigmas were multiplied by this.
+  // To be called when the readings' sigmas in the data were multiplied by this.
   void scale_noise(double ratio);
 
   // By how many standard deviations the latest estimate differs from what was subtracted before it.
@@ -62,7 +65,7 @@ class TelemetryDepartures {
   struct PlayColumn {
     double ahead = 0;   // rad, at the present width
     double slope = 0;   // d ahead / d width
-    double unsure = 0;  // rad
+    double unsure = 0;  // rad, sigma of `ahead`: the state of the play is not known
   };
   struct Columns {  // of one reading of one axis
     CurveWeights curve;
@@ -75,7 +78,8 @@ class TelemetryDepartures {
   };
 
   void begin(const AdjustmentData& data, const AdjustmentState& state);
-  // No amplitude may be larger than some times what telemetry is off by.
+  // Sets the largest amplitude of each part: 5 times the RMS of the residuals before any departure
+  // was subtracted.
   void limit_amplitudes(const AdjustmentData& data, const AdjustmentState& state,
                         const Linearisation& at);
   void find_columns(const AdjustmentData& data, const AdjustmentState& state,
@@ -89,13 +93,13 @@ class TelemetryDepartures {
   void add_slope(int axis, double rise, Eigen::MatrixXd* root) const;
   // Where g is a curve of no period, its bend tells little of its slope.
   void add_possible_slopes(Eigen::MatrixXd* sure) const;
-  // Of either axis g may have any slope: no choice must rest on the other axis having none.
+  // g of both axes may have a slope: the choice must not assume that the other axis has none.
   [[nodiscard]] Eigen::MatrixXd with_slopes(const Eigen::MatrixXd& sure) const;
-  // A head that errs by so much on one axis may well err as much on the other one, too slowly to
-  // show more than a bend.
+  // If one axis has an error of some size, the other one may have such an error, too. If that is
+  // slow, it shows no more than a bend.
   void add_possible_curves(const Normal& normal, const Eigen::MatrixXd& sure);
-  // A head that errs by so much may well have play of that size, too, which slow movements do not
-  // tell from the clock offset.
+  // If an axis has an error of some size, it may have play of that size, too. Slow movements do not
+  // tell play from the clock offset.
   void add_possible_play(Eigen::MatrixXd* sure) const;
   // Parts of c: for each axis a curve, ripples on its knots, then play of either kind.
   [[nodiscard]] static std::size_t curve_part(int axis) {

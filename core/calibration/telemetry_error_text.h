@@ -1,10 +1,11 @@
 #pragma once
-// Errors of telemetry's angles (core/model/telemetry_error.h) in a calibration.yaml. All keys may
-// be absent: then telemetry is exact, except for scale and noise.
+// Errors of telemetry's angles (core/model/telemetry_error.h) in a calibration.yaml. Each key is
+// optional; without it telemetry has no such error.
 //   pan_error: {knots_rad: {first: -0.4, spacing: 0.05}, values_rad: [...], sigma_rad: [...],
 //               length_rad: 0.1, unseen_sigma_rad: 2e-4}
-//   tilt_error: ...                                 likewise; without knots: unseen_sigma_rad alone
-//   pan_play_rad: {value: 3e-4, sigma: 1e-5, kind: motor}      or output: where the encoder is
+//   tilt_error: ...    likewise. knots_rad, values_rad and sigma_rad: all three or none; length_rad
+//                      is optional
+//   pan_play_rad: {value: 3e-4, sigma: 1e-5, kind: motor}    kind: motor or output (play.h)
 //   tilt_play_rad: ...
 // Reading back what was written gives the same bits. Allocates.
 
@@ -15,7 +16,7 @@
 
 namespace alidade::internal {
 
-// Throws YamlError. Without a key its part of the result does not exist().
+// Throws YamlError. Of a key that is absent, the part of the result has exists() == false.
 [[nodiscard]] TelemetryError read_telemetry_error(const EstimateReader& file);
 // Writes the keys that are needed into a map.
 void write_telemetry_error(const TelemetryError& error, YAML::Emitter* out);

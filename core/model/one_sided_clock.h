@@ -2,10 +2,10 @@
 // OneSidedClock: the line of a stream whose items are never early. Used by ClockFilter.
 // The line is the lower envelope of a sliding window. It contains the minimum delay. A step of the
 // minimum delay (minimum_delay_step.h) beyond min_delay_step_s is subtracted from all later receive
-// times: the line continues, and its variance grows by the step's. While a rise is suspected, late
-// items do not count. Before the lock the line follows a fall. If fewer than kLeastOnLine items
-// have come down to the line before a rise, it was an early item that dragged the line down: the
-// line then moves up, and only items since the rise count.
+// times: the line continues, and its variance grows by the step's and the line's own there. While a
+// rise is suspected, late items do not move the line, if kLeastOnLine items had come down to it.
+// With fewer it was an early item that dragged the line down: the line then moves up, and only
+// items since the rise count. Before the lock the line follows a fall.
 // Fixed memory, trivially copyable, no allocation, no exceptions. All times are host seconds.
 
 #include <algorithm>
@@ -33,7 +33,8 @@ class OneSidedClock {
     envelope_.start(prior);
   }
 
-  // Forgets the steps. The line does not answer again until start().
+  // Forgets the sum of the steps, but not shift_since_s(). Until start(), line() is the old line,
+  // which must not be used.
   void restart() {
     shift_s_ = shift_variance_ = 0;
     locked_ = false;
@@ -41,7 +42,8 @@ class OneSidedClock {
     steps_.restart();
   }
 
-  // From now on the line does not move by itself, so steps of the minimum delay show against it.
+  // From now on items move the line only from an age of settle_s / 10 on. So the line has not yet
+  // followed a fall of the minimum delay when learn() notices it.
   void lock(double receive_s) {
     locked_ = true;
     bound_since_s_ = receive_s;

@@ -16,14 +16,14 @@
 namespace alidade {
 
 struct SceneCheck {
-  std::string file;  // empty: none is configured
-  // Why the map cannot be used; empty: it can, or it was not tried as no picture came.
+  std::string file;  // empty: none is configured, or mode PT does not use it
+  // Why the map cannot be used. Empty: it can, or nothing gave the size of the pictures.
   std::string error;
   std::int64_t keyframes = 0;
   std::int64_t landmarks = 0;
   std::int64_t frame = 0;             // number of the picture
   std::optional<Localization> found;  // empty: not tried
-  Mechanics<double> mechanics;        // by which angles follow from the orientation
+  Mechanics<double> mechanics;        // the map's; gives pan and tilt of what was found
   Findings findings;
 };
 
@@ -32,6 +32,7 @@ struct SceneCheck {
 
 // For the line "scene map": whether the map can be used.
 [[nodiscard]] std::string headline(const SceneCheck& scene);
+// Lines for the report: where the picture looks, or why that is not known. Empty: not tried.
 [[nodiscard]] ReportLines describe(const SceneCheck& scene);
 
 }  // namespace alidade

@@ -1,5 +1,5 @@
 #pragma once
-// What the sub-commands share: exit codes, the failure of one line, and functions that make sources
+// What the sub-commands share: exit codes, CommandError, and functions that make sources
 // and the options of a real-time step from a configuration.
 
 #include <memory>
@@ -26,7 +26,8 @@ struct CommandError : std::runtime_error {
   ExitCode exit_code;
 };
 
-// Loads the configuration and logs its warnings; throws CommandError.
+// Loads the configuration and logs its warnings. For a recording, video.width and video.height
+// become the recording's, if it can be read. Throws CommandError.
 Config require_config(const std::string& path);
 
 // Section `video` of a configuration that needs no other (ConfigScope::kVideo); throws
@@ -36,31 +37,36 @@ VideoConfig require_video_config(const std::string& path);
 // The calibration in a file, with its zoom curve, without a map. Throws CommandError.
 PublishedCalibration require_calibration_file(const std::string& path);
 
-// The calibration of calibration.file. The data sheet's if no file is named, or if calibration.auto
-// is set and the file does not exist yet. Throws CommandError.
+// The calibration of calibration.file. The data sheet's if no file is named, or if the file does
+// not exist yet, calibration.auto is set and camera.focal_length_px is given; the image size is
+// then that of section `video`. Throws CommandError if the file cannot be used, or if it is for
+// another image size than section `video` states for a live video.
 PublishedCalibration choose_calibration(const Config& config);
 
 // The ground plane that the configuration names; null if it names none. Throws CommandError.
 std::shared_ptr<const PlaneEstimate> require_plane(const Config& config);
 
-// A camera that is known only from its data sheet: nominal axes, no offsets, and standard
-// deviations large enough to allow for the real ones.
+// A camera that is known only from its data sheet, with nominal axes and a clock offset of 0.
+// camera.focal_length_px must be set. Sigmas: 0.05 rad for each axis, 0.1 s for the clock offset,
+// that of the focal length if its range is given, 0 (exact) for all else. Sets no image size.
 Calibration data_sheet_calibration(const CameraConfig& camera);
 
 // Options of a real-time step with this calibration. The noise is what the configuration, or the
-// noise.yaml of a recording, states.
+// noise.yaml of a recording, states. With a Config: throws CommandError if pan_error or tilt_error
+// changes faster than the steps of pan_tilt.angle_quantum_rad can show.
 OrientationStepOptions step_options(const Config& config, const PublishedCalibration& calibration);
 OrientationStepOptions step_options(const RecordingNoise& noise,
                                     const PublishedCalibration& calibration);
 
-// Never null. decode: frames have images. copy_to: the video stream is copied to this file; empty:
-// to none.
+// Never null. decode: frames have images. copy_to: the file to which a live stream is copied;
+// empty: none. A recording is not copied.
 std::unique_ptr<FrameSource> make_frame_source(const VideoConfig& config, bool decode,
                                                const std::string& copy_to = "");
+// Never null. With type `none` the stream ends at once (ReadStatus::kEnd).
 std::unique_ptr<PanTiltSource> make_pan_tilt_source(const PanTiltConfig& config);
 
-// A live source may take so much longer than its own timeout to its first item, for the login and a
-// first key frame. The source reports earlier what it waits for.
+// s. A live source has its own timeout and this much more until its first item must be there: for
+// the login and a first key frame. The source's own error, if it has one, comes earlier.
 inline constexpr double kConnectSlack_s = 4;
 
 // One line: the link is connected and nothing came.

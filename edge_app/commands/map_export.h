@@ -1,6 +1,7 @@
 #pragma once
-// `alidade map export`: writes keyframes.csv, the pictures of the keyframes, and panorama.png, one
-// picture of everything that the keyframes show.
+// `alidade map export`: writes keyframes.csv, the pictures of the keyframes (keyframes/ID.jpg), and
+// panorama.png. The panorama shows everything that the keyframes show: grey, equirectangular in the
+// base frame, pan to the right, black elsewhere.
 
 #include <string>
 
@@ -8,11 +9,12 @@ namespace alidade {
 
 struct MapExportCommand {
   std::string map;            // a scene map's file
-  std::string directory;      // for the results; is made if it does not exist
-  int panorama_width = 4096;  // px, at most
+  std::string directory;      // for the results; not empty; is made if it does not exist
+  int panorama_width = 4096;  // px, > 0; the panorama is not wider
 };
 
-// Returns the exit code; throws CommandError.
+// Returns kExitOk. Throws CommandError if the map cannot be read or has no keyframes, or if a file
+// cannot be written.
 [[nodiscard]] int export_map(const MapExportCommand& options);
 
 }  // namespace alidade

@@ -18,13 +18,14 @@ namespace alidade {
 // The prior of log f for a zoom reading.
 class FocalLengthKnowledge {
  public:
-  // Nothing is known: one lens that does not zoom.
+  // at() is always empty: the focal length is not known. For a lens that does not zoom.
   FocalLengthKnowledge() = default;
   // From a calibration. With a curve, f follows the reading within the curve's range; outside of it
   // nothing is known. With an empty curve, the calibration's f holds for every reading.
   FocalLengthKnowledge(const Calibration& calibration, const ZoomCurve& curve);
-  // From a data sheet: one focal length; or log f linear in the reading, beyond the two ends as
-  // between them. The end readings (device units) must differ.
+  // From a data sheet, px, > 0: one focal length (sigma of log f 0.02), or log f as a linear
+  // function of the reading (sigma 0.1), which also holds beyond its two ends. The end readings
+  // (device units) must differ.
   explicit FocalLengthKnowledge(double px);
   FocalLengthKnowledge(double wide_px, double tele_px, double wide_reading, double tele_reading);
 
@@ -39,7 +40,9 @@ class FocalLengthKnowledge {
 
 // From the command line: --focal-length PX or WIDE:TELE takes precedence over the calibration.
 // focal_length: the option's value; empty: not given. calibration: may be null. readings: those of
-// all recordings; the least one belongs to WIDE, the greatest one to TELE. Throws CommandError.
+// all recordings; the least one belongs to WIDE, the greatest one to TELE. Throws
+// CommandError if the value cannot be read or does not suit the readings, or if the readings differ
+// and nothing gives f for them.
 [[nodiscard]] FocalLengthKnowledge focal_length_knowledge(const std::string& focal_length,
                                                           const Calibration* calibration,
                                                           const ZoomCurve& curve,
@@ -52,11 +55,12 @@ struct MapRecording {
   std::vector<FrameStamp> frames;
   std::vector<PanTiltSample> telemetry;  // by latest_time_s; empty: none, or not wanted
 
-  // Those of the samples that have one, device units, in order of time.
+  // Device units, in order of time. Samples without a reading are left out.
   [[nodiscard]] std::vector<double> zoom_readings() const;
 };
 
-// Throws CommandError.
+// Reads the tables, sorts telemetry and removes the jitter of its zoom readings (steady_zoom()).
+// Throws CommandError if a table is malformed, or if there are no pictures or no frames.
 [[nodiscard]] MapRecording load_map_recording(const std::string& directory, bool with_telemetry);
 
 // What is known of one frame. If `calibration` is null, the mechanics are nominal and the clock
@@ -65,11 +69,12 @@ struct MapRecording {
 [[nodiscard]] MapView map_view(const MapRecording& recording, const FrameStamp& frame,
                                const Calibration* calibration, const FocalLengthKnowledge& known);
 
-// Bounds the error of the motion that telemetry gives for one frame's read-out: the read-out time
-// times the largest difference between the view's rates and the rates of telemetry's intervals
-// around the frame. Around means 0.05 s with a calibration, 1 s without, as the clock offset is not
-// known then. view: of this frame. line_delay: s/row; 0: not known; the result then bounds the
-// motion itself, over 30 ms. kUnknownMotion: the frame has too little telemetry around it.
+// How far the motion in `view`, a frame's, may be wrong over that frame's read-out: turn =
+// read-out time x (largest difference between view's rates and those of the telemetry around the
+// frame + 2 % of the largest of these rates); log f likewise. "Around" is within 0.05 s with a
+// calibration, within 1 s without, as the clock offset is then not known. line_delay: s/row; 0: not
+// known; the result is then the largest rate x 30 ms. kUnknownMotion: too little telemetry there.
+// log_f stays infinite if a sample there has no zoom reading or the reading no f.
 [[nodiscard]] MotionDoubt motion_doubt(const MapRecording& recording, const FrameStamp& frame,
                                        const Calibration* calibration,
                                        const FocalLengthKnowledge& known, const MapView& view,

@@ -1,7 +1,8 @@
 #pragma once
 // The HTTP endpoints of `alidade run`, described by openapi.yaml. They give the data of LiveState
-// and pipeline as JSON, Server-Sent Events and Prometheus text. Handlers run on the server's
-// threads. Nothing here touches the real-time thread.
+// and pipeline as JSON, Server-Sent Events and Prometheus text, and take detections, held frames,
+// plane fits and requests for a calibration. Handlers run on the server's threads. Nothing here
+// touches the real-time thread.
 
 #include <functional>
 #include <memory>
@@ -25,19 +26,21 @@ struct HttpApiSources {
   LiveState* live = nullptr;
   std::function<PipelineSummary()> summary;
   std::function<FrameSourceCounters()> video_losses;
-  // Returns false if nothing is calibrated.
+  // Starts a fresh calibration. False: this program does not calibrate, as that needs mode OE, live
+  // video and calibration.auto.
   std::function<bool()> ask_for_calibration;
   // The zoom curve in use; returns null if there is none. May be an empty function.
   std::function<std::shared_ptr<const ZoomCurve>()> zoom_curve;
   // The errors by which the telemetry is corrected; may return null, and may be an empty function.
   std::function<std::shared_ptr<const TelemetryError>()> telemetry_error;
   std::shared_ptr<const PlaneEstimate> plane;  // null: none is configured
-  // Of directions of things at a known distance; the nearness of the scene that is in view.
+  // For directions of things at a distance (pixel_query.h): the lens's pupil, and scene_nearness()
+  // of the scene from which the calibration is made; 0: no scene is configured.
   Pupil pupil;
   double scene_nearness = 0;
   // Fits the ground plane. body and *answer are JSON; false with one line in *error.
   std::function<bool(const std::string& body, std::string* answer, std::string* error)> fit_plane;
-  // Both null if nothing is tracked. They must live as long as `live`, and wake the server, too.
+  // Both null if nothing is tracked. Both must live as long as `live`.
   TargetFeed* targets = nullptr;
   TargetLines* target_lines = nullptr;
   std::function<DetectorsReport()> detectors;  // empty: no built-in detector
@@ -51,8 +54,10 @@ struct HttpApiSources {
 // The zoom curve in use. Null: there is none.
 [[nodiscard]] std::shared_ptr<const ZoomCurve> zoom_curve_of(const HttpApiSources& sources);
 
-// *sources.live and the functions are used until the server has stopped. Every record wakes the
-// server. So the server must exist as long as records come, even after it has stopped.
+// `live` and the functions are used on the server's threads, several at a time, until the server
+// has stopped. Functions must be set unless they "may be empty". Every record wakes the server, and
+// so does every line of target_lines, whose on_news is replaced: call this before the first one.
+// The server must exist as long as they come, even after it has stopped.
 void add_api_routes(HttpServer* server, const HttpApiSources& sources);
 
 }  // namespace alidade

@@ -1,15 +1,12 @@
 #pragma once
-// Requests and answers of POST /api/v1/direction and /api/v1/pixel as JSON: the directions of a
-// frame's pixels, each at the time of its own row, and the pixels that see given directions.
-//
+// POST /api/v1/direction and /api/v1/pixel: requests and answers as JSON (schemas: openapi.yaml).
+// The first asks where pixels of a frame look, each when its own row was exposed. The second asks
+// which pixels see given directions.
 //   {"frame": N | "time_s": t, "pixels": [[u, v], ...], "pixel_sigma_px": s, "distance_m": r}
 //   {"frame": N | "time_s": t, "directions": [[x, y, z], ...]}
-//
-// Frames, units, directions, pixels and covariances are those of frame_orientation.h. A covariance
-// holds the errors of motion and of calibration, and their correlation, each once. For the noise of
-// the pixel s^2 J_u J_u^T is added. With a distance (m, from where the axes meet) a direction is
-// that of a thing there (pupil.h), and the covariance holds what the pupil's place leaves open. The
-// parsers are pure and strict (json_query.h); more than kMaxQueryItems are an error, too.
+// Pixels, directions (base frame) and covariances are as in frame_orientation.h. The parsers are
+// pure and strict (json_query.h). A request without items, or with more than kMaxQueryItems, is an
+// error.
 
 #include <cstdint>
 #include <optional>
@@ -25,18 +22,20 @@
 namespace alidade {
 
 inline constexpr std::size_t kMaxQueryItems = 1000;
+// The largest body of these and of other small requests; the HTTP server refuses a larger one.
 inline constexpr std::size_t kMaxQueryBytes = std::size_t{64} << 10;
 
 struct DirectionQuery {
   FrameChoice which;
   std::vector<Vector2<double>> pixels;  // px
-  double pixel_sigma_px = 0;            // of each coordinate, to 1000; 0: pixels are exact
+  double pixel_sigma_px = 0;            // of each coordinate, 0 to 1000; 0: exact
   std::optional<double> distance_m;     // of what is seen, kNearestScene_m to 1e9; empty: far
 };
 
 struct PixelQuery {
   FrameChoice which;
-  std::vector<Vector3<double>> directions;  // unit vectors, base frame
+  std::vector<Vector3<double>>
+      directions;  // unit vectors, base frame; any length but 0 in the request
 };
 
 // *query must be empty before. False with one line in *error; *query is then undefined.
@@ -45,10 +44,13 @@ struct PixelQuery {
 [[nodiscard]] bool parse_pixel_query(const std::string& body, PixelQuery* query,
                                      std::string* error);
 
-// The answer as one line of JSON with a line feed. The record must have a frame, a time and an
-// orientation. A pixel or direction without an answer gets `error` in place of it.
-// With a plane, each direction also has its place on the plane. scene_nearness: of the scene for
-// which the calibration was made (pupil.h), for directions at a distance.
+// One line of JSON with a line feed. The record must have a frame, a time and an orientation. An
+// item without an answer has only its pixel or direction, and `error`.
+// covariance: errors of motion and calibration, with their correlation; plus s^2 J J^T, J the
+// derivative of the direction by the pixel (rad/px), in `basis`. With distance_m the direction is
+// that from where the axes meet, and the covariance also has the error of the pupil's place.
+// plane: if not null, each direction also has its place on it. scene_nearness: of the scene from
+// which the calibration was made (pupil.h); used only with distance_m.
 [[nodiscard]] std::string direction_answer(const OrientationRecord& record,
                                            const DirectionQuery& query,
                                            const PlaneEstimate* plane = nullptr,

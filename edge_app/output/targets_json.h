@@ -11,10 +11,12 @@ namespace alidade {
 
 [[nodiscard]] nlohmann::ordered_json targets_json(const TargetList& list);
 
-// The targets in the newest frame of detections that was accepted. Ends with a line feed.
+// The targets at the newest frame whose detections were accepted; state.updates must be above 0.
+// Ends with a line feed.
 [[nodiscard]] std::string targets_line(const TargetsState& state);
 
-// How many frames and boxes were accepted, and how many were refused for which reason.
+// How many frames and boxes were accepted, how many were refused for which reason, and how many new
+// targets were refused because there were too many.
 [[nodiscard]] nlohmann::ordered_json target_counters_json(const TargetCounters& counters);
 
 }  // namespace alidade

@@ -1,6 +1,6 @@
 #pragma once
-// Converts what an estimator saw in the frame it processed last to tracks for the calibration
-// thread, and to landmarks for display. px of the full image (CONVENTIONS.md). No allocation.
+// What an estimator saw in its latest frame: as tracks, for the calibration thread, and as
+// landmarks, for display. px of the full image (CONVENTIONS.md). No allocation.
 
 #include <optional>
 
@@ -11,17 +11,20 @@
 
 namespace alidade {
 
-// Sets points and count, and leaves the rest. Points that exceed the room are left out.
+// Sets points and count, and leaves the rest. Points beyond kMaxFramePoints are left
+// out.
 void get_tracks(const StartUpTracker& tracker, FrameTracks* tracks);
-// Also sets oe_status. No points unless it is kOk; of the landmarks found, only inliers that are no
-// edges (track_sigma()).
+// Sets oe_status, too. There are points only if it is kOk: the inliers that are not edges
+// (track_sigma()).
 void get_tracks(const OeMode& mode, FrameTracks* tracks);
 
+// Both functions set kind, count and found. Points beyond kMaxFramePoints are left out.
 void get_landmarks(const StartUpTracker& tracker, FrameLandmarks* landmarks);
-// Each at the position that the solution expects, with its residual.
+// kind is kNone unless the status is kOk. Each landmark is where the solution expects it, with its
+// residual (of an edge: the part across it).
 void get_landmarks(const OeMode& mode, FrameLandmarks* landmarks);
 
-// px, root mean square length of the inliers' residuals. Empty if there are none.
+// px, root mean square length of the inliers' residuals. Empty: there is none.
 [[nodiscard]] std::optional<double> residual_rms(const OeMode& mode);
 
 }  // namespace alidade

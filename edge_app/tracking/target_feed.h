@@ -1,8 +1,8 @@
 #pragma once
 // TargetFeed: a TargetStage on a niced thread of its own, behind a bounded queue. offer() answers
-// at once whether detections are taken; nobody waits for the thread, and the threads on a record's
-// way do not depend on it. The stage may still refuse a frame that offer() has taken, for example a
-// late frame that it already had. Such refusals are counted.
+// at once whether detections are taken. Only stop() waits for the thread. The threads that make and
+// write records share no lock with it. The stage may still refuse a frame that offer() has taken,
+// for example a late frame that it already had. Such refusals are counted.
 
 #include <condition_variable>
 #include <deque>
@@ -21,6 +21,7 @@ class TargetFeed {
   static constexpr std::size_t kMostWaiting = 32;  // frames
   using OnNews = std::function<void(const std::shared_ptr<const TargetsState>&)>;
 
+  // options: valid. plane: null on the sphere.
   TargetFeed(const TargetOptions& options, std::shared_ptr<const PlaneEstimate> plane);
   ~TargetFeed();
   TargetFeed(const TargetFeed&) = delete;
@@ -29,7 +30,9 @@ class TargetFeed {
   // To be called before start(). on_news runs on the feed's thread after each frame that was taken.
   void add_on_news(OnNews on_news) { on_news_.push_back(std::move(on_news)); }
   [[nodiscard]] bool start();  // false: no thread could be started
-  void stop();                 // frames that still wait are dropped
+  // Final. Drops the frames that wait, and waits for the one at work and its on_news. So on_news
+  // must not call it.
+  void stop();
 
   // Any thread. Counts refused frames.
   [[nodiscard]] DetectionAnswer offer(DetectedFrame frame);
@@ -37,7 +40,7 @@ class TargetFeed {
   void count_refused(DetectionStatus status);
 
   [[nodiscard]] const TargetOptions& options() const { return options_; }
-  // All of one moment.
+  // Any thread. All values are of one moment; counters include the frames that offer() refused.
   struct Snapshot {
     std::shared_ptr<const TargetsState> newest;  // null before the first frame taken
     TargetCounters counters;

@@ -23,12 +23,16 @@ class RtspTls {
   RtspTls(const RtspTls&) = delete;
   RtspTls& operator=(const RtspTls&) = delete;
 
-  // To be called before connecting. kFailed: *error is one line.
+  // To be called before each attempt to connect: loads the certificates and forgets the last
+  // refusal. kFailed, with one line in *error: this machine has no TLS, or the file has no
+  // certificate.
   [[nodiscard]] ReadStatus prepare(std::string* error);
   // To be called at the start of the handshake. The connection must not outlive this object.
   void judge(GTlsConnection* connection);
 
-  // If the certificate was refused: the status, and *error is one line. kOk: not refused.
+  // Whether the certificate was refused since prepare(), with one line in *error. kFailed: no known
+  // authority signed it, or it is for another name. kDisconnected: any other fault, as it may come
+  // from a clock of this machine that is not set yet. kOk: not refused.
   [[nodiscard]] ReadStatus refusal(std::string* error) const;
 
  private:

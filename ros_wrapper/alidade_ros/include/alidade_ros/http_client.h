@@ -37,12 +37,13 @@ class HttpClient {
   HttpClient(const HttpClient&) = delete;
   HttpClient& operator=(const HttpClient&) = delete;
 
-  // Thread-safe.
+  // Thread-safe. An error after 10 s without data, or if the answer exceeds 16 MiB.
   [[nodiscard]] Answer get(const std::string& path);
   [[nodiscard]] Answer post(const std::string& path, const std::string& json);
 
-  // Reads until the connection ends, which is always an error, or on_bytes returns false.
-  // Thread-safe.
+  // Reads until the connection ends, silence_timeout_s passes without data, stop() is called, or
+  // on_bytes returns false. Calls on_bytes on this thread, and only if the status is 200. Returns
+  // one line on why it ended, never empty, even if on_bytes ended it. Thread-safe.
   [[nodiscard]] std::string stream(const std::string& path,
                                    const std::function<bool(const char*, std::size_t)>& on_bytes);
 

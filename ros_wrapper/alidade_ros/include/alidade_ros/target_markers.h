@@ -1,9 +1,10 @@
 #pragma once
-// TargetMarkers: RViz markers of targets, including the removal of earlier ones. No side effects.
-// On the plane, in its frame: the 95 % ellipse of the position as a flat sphere, an arrow to the
-// position in a second, a box of the apparent size, and the identity above. As directions, in the
-// base's frame: the same at a distance that the user chooses. A target out of view is pale. Colours
-// depend on the identity.
+// TargetMarkers: RViz markers of targets, and the removal of those drawn before. Publishes nothing.
+// One thread. On the plane, in its frame: the 95 % ellipse of the position as a flat sphere, an
+// arrow to the position one second later, a box of the apparent size, and above it a text with
+// identity and class. As directions, in the base's frame: the same at a distance that the user
+// chooses; none for a direction at a pole. A target that is probably out of view (in_view < 0.5) is
+// more transparent. Colours depend on the identity.
 
 #include <alidade_msgs/Targets.h>
 #include <visualization_msgs/MarkerArray.h>
@@ -15,7 +16,8 @@
 
 namespace alidade_ros {
 
-// Gives the size of a pixel at a target; without a camera position no boxes are drawn.
+// Gives the size of boxes. No boxes are drawn without a focal length (0) nor, on the plane, without
+// a camera position.
 struct MarkerView {
   double focal_length = 0;      // px
   double aspect = 1;            // vertical focal length / focal_length
