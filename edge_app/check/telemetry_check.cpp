@@ -31,19 +31,19 @@ void judge_rate(TelemetryReport* report, const TelemetryNeeds& needs) {
   const double bounds_s = report->bounds_s ? report->bounds_s->median : 0;
   // An image is looked up clock_offset_s later.
   const double age_s = (report->age_s ? report->age_s->most : 0) + needs.clock_offset_s;
-  if (interval_s > needs.max_gap_s) {
+  if (interval_s > needs.limits.max_gap_s) {
     add_problem(&report->findings,
                 fmt::format("{}one sample every {:.2f} s; between samples more than {:.1f} s apart "
                             "no angle is given: raise pan_tilt.rate_hz",
-                            where, interval_s, needs.max_gap_s));
-  } else if (age_s > needs.max_extrapolation_s) {
+                            where, interval_s, needs.limits.max_gap_s));
+  } else if (age_s > needs.limits.max_extrapolation_s) {
     add_problem(&report->findings,
                 fmt::format("{}the newest angle is up to {:.0f} ms old (95 %) when a frame needs "
                             "it (pan_tilt.max_repeat_s, {:.0f} ms, is part of it while the head "
                             "rests), but realtime.max_extrapolation_s is {:.0f} ms, so such frames "
                             "get no angle; set it to {:.2f}, or raise pan_tilt.rate_hz",
-                            where, 1e3 * age_s, 1e3 * needs.max_repeat_s,
-                            1e3 * needs.max_extrapolation_s, kReserve * age_s + 0.005));
+                            where, 1e3 * age_s, 1e3 * needs.limits.max_repeat_s,
+                            1e3 * needs.limits.max_extrapolation_s, kReserve * age_s + 0.005));
   } else if (needs.rate_hz && *report->rate_hz < kMuchSlower * *needs.rate_hz) {
     add_advice(
         &report->findings,
@@ -58,13 +58,14 @@ void judge_rate(TelemetryReport* report, const TelemetryNeeds& needs) {
 void judge_repeats(TelemetryReport* report, const TelemetryNeeds& needs) {
   constexpr double kReserve = 1.2;
   constexpr double kRounding = 1e-6;
-  if (report->stale == 0 || report->longest_stale_s <= needs.max_repeat_s) return;
-  add_problem(&report->findings,
-              fmt::format("pan/tilt {}: while the head turns, it repeats an old angle for up to "
-                          "{:.0f} ms; after pan_tilt.max_repeat_s, {:.0f} ms, a repeated angle "
-                          "counts as rest: set max_repeat_s: {:.2f}",
-                          needs.source, 1e3 * report->longest_stale_s, 1e3 * needs.max_repeat_s,
-                          std::ceil(100 * kReserve * report->longest_change_s - kRounding) / 100));
+  if (report->stale == 0 || report->longest_stale_s <= needs.limits.max_repeat_s) return;
+  add_problem(
+      &report->findings,
+      fmt::format("pan/tilt {}: while the head turns, it repeats an old angle for up to "
+                  "{:.0f} ms; after pan_tilt.max_repeat_s, {:.0f} ms, a repeated angle "
+                  "counts as rest: set max_repeat_s: {:.2f}",
+                  needs.source, 1e3 * report->longest_stale_s, 1e3 * needs.limits.max_repeat_s,
+                  std::ceil(100 * kReserve * report->longest_change_s - kRounding) / 100));
 }
 
 // Rounding to steps of q has a standard deviation of q / sqrt(12). If that exceeds the noise that

@@ -31,9 +31,7 @@ namespace alidade {
 struct TelemetryNeeds {
   std::string source;
   std::optional<double> rate_hz;  // of the requested polls
-  double max_repeat_s = TelemetryLimits().max_repeat_s;
-  double max_gap_s = TelemetryLimits().max_gap_s;
-  double max_extrapolation_s = TelemetryLimits().max_extrapolation_s;
+  TelemetryLimits limits;         // as used by run
   double angle_sigma_rad = 1e-4;  // TelemetryNoise, as used by run
   double resolution_rad = 0;
   double focal_length_px = 0;  // 0: unknown

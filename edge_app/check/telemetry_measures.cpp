@@ -100,11 +100,7 @@ void measure_turning(const std::vector<PanTiltSample>& samples, const std::vecto
 
 std::optional<Spread> ages_of(const std::vector<PanTiltSample>& samples,
                               const std::vector<double>& delivered_s, const TelemetryNeeds& needs) {
-  TelemetryLimits limits;
-  limits.max_gap_s = needs.max_gap_s;
-  limits.max_extrapolation_s = needs.max_extrapolation_s;
-  limits.max_repeat_s = needs.max_repeat_s;
-  TelemetryBuffer<16> buffer(TelemetryNoise(), limits);
+  TelemetryBuffer<16> buffer(TelemetryNoise(), needs.limits);
   std::vector<double> ages;
   for (std::size_t i = 0; i < samples.size(); ++i) {
     if (samples[i].restarted) buffer.clear();

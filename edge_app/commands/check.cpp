@@ -128,9 +128,7 @@ TelemetryNeeds telemetry_needs(const Measured& measured, const Config& config,
   TelemetryNeeds needs;
   needs.source = measured.pan_tilt.name;
   if (!is_recording(config)) needs.rate_hz = config.pan_tilt.rate_hz;
-  needs.max_repeat_s = step.telemetry_limits.max_repeat_s;
-  needs.max_gap_s = step.telemetry_limits.max_gap_s;
-  needs.max_extrapolation_s = step.telemetry_limits.max_extrapolation_s;
+  needs.limits = step.telemetry_limits;
   needs.angle_sigma_rad = step.telemetry_noise.pan_tilt_sigma;
   needs.resolution_rad = step.telemetry_noise.resolution;
   needs.focal_length_px = calibration.calibration.camera.focal_length;

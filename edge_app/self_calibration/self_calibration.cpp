@@ -131,6 +131,12 @@ void SelfCalibration::judge_agreement(const FrameTracks& tracks) {
     disagreement_.restart();
     return;
   }
+  withdraw(fmt::format("landmarks contradict telemetry in {} of {} frames",
+                       disagreement_.contradicted_frames(), disagreement_.frames()),
+           "was the camera moved on its mount, or its lens?");
+}
+
+void SelfCalibration::withdraw(const std::string& reason, const std::string& question) {
   auto withdrawn = std::make_shared<PublishedCalibration>();
   // Its values are still the best guess. A data sheet that states a value as exact does not make
   // it better known than it was.
@@ -138,10 +144,8 @@ void SelfCalibration::judge_agreement(const FrameTracks& tracks) {
   withdrawn->calibration.covariance += options_.data_sheet.covariance;
   withdrawn->telemetry_error = publication_.object()->telemetry_error;
   withdrawn->name = publication_.object()->name + ", withdrawn";
-  messages_.say(fmt::format(
-      "landmarks contradict telemetry in {} of {} frames: the calibration {} is "
-      "withdrawn (was the camera moved on its mount, or its lens?); calibrating anew",
-      disagreement_.contradicted_frames(), disagreement_.frames(), publication_.object()->name));
+  messages_.say(fmt::format("{}: the calibration {} is withdrawn ({}); calibrating anew", reason,
+                            publication_.object()->name, question));
   publication_.withdraw(withdrawn);
   nodes_.doubt();
   begin_anew();

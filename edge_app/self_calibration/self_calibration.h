@@ -94,6 +94,8 @@ class SelfCalibration {
   bool judge_delay(const FrameTracks& tracks);
   void widen_contradicted();
   void judge_agreement(const FrameTracks& tracks);
+  // Takes the published calibration back and begins anew. reason, question: for the message.
+  void withdraw(const std::string& reason, const std::string& question);
   [[nodiscard]] bool is_calibrated_here() const;
   [[nodiscard]] bool storing_is_due() const;
   [[nodiscard]] bool adjusting_is_due() const;

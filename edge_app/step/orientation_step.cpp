@@ -297,20 +297,25 @@ void OrientationStep::orient(const InterpolatedPanTilt* measured, const ImageVie
     if (measured != nullptr) record->status = RecordStatus::kNotFinite;
     return;
   }
-  record->mode = frame.mode == OrientationMode::kOe ? RecordMode::kOe : RecordMode::kPt;
+  record->mode = RecordMode::kPt;
   if (oe_ && !answered_by_oe_) record->status = RecordStatus::kNotCalibrated;
-  record->landmarks = frame.landmarks;
   if (lens == nullptr) allow_for_begun_movement(&frame.calibration);
   if (focal_length() == FocalLength::kLearnt) record->camera = pack(frame.calibration);
-  if (record->mode == RecordMode::kOe) {
-    record->residual_px = residual_rms(*oe_);
-    lens_.note_found(frame.calibration, frame.zoom_rate);
+  if (frame.mode == OrientationMode::kOe) {
+    note_landmarks(frame, record);
     if (lens != nullptr) lens_.judge(frame.calibration);
   }
   record->orientation = orientation_of(frame);
   note_tie(record);
   if (record->mode == RecordMode::kOe && measured != nullptr)
     record->telemetry_error = telemetry_error(*measured, frame, *record);
+}
+
+void OrientationStep::note_landmarks(const FrameOrientation& frame, OrientationRecord* record) {
+  record->mode = RecordMode::kOe;
+  record->landmarks = frame.landmarks;
+  record->residual_px = residual_rms(*oe_);
+  lens_.note_found(frame.calibration, frame.zoom_rate);
 }
 
 PanTilt<double> OrientationStep::telemetry_error(const InterpolatedPanTilt& measured,

@@ -167,6 +167,9 @@ class OrientationStep {
   void note_curve_here();
   // OE mode's map can be used with `published`, and is worth more than the map that comes with it.
   [[nodiscard]] bool keeps_map(const PublishedCalibration& published) const;
+  // Completes a record of mode OE, with telemetry or without, by what the landmarks showed, but for
+  // its orientation and status.
+  void note_landmarks(const FrameOrientation& frame, OrientationRecord* record);
   // Fills record->localized if the scene map has tied the base.
   void note_tie(OrientationRecord* record) const;
   // Passes telemetry to OE mode for frames that were answered by extrapolation, once samples

@@ -75,15 +75,12 @@ void OrientationStep::orient_by_scene(const ImageView& image, OrientationRecord*
                                      &frame) == OeStatus::kOk) {
     scene_start_.forget();
     answered_by_oe_ = true;
-    lens_.note_found(frame.calibration, frame.zoom_rate);
+    note_landmarks(frame, record);
     if (focal_length() == FocalLength::kLearnt) {
       record->camera = pack(frame.calibration);
       scene_lens_ = frame.calibration;
     }
-    record->mode = RecordMode::kOe;
     record->status = status_of_telemetry(QueryStatus::kOk, false, record->clock_locked);
-    record->landmarks = frame.landmarks;
-    record->residual_px = residual_rms(*oe_);
     record->orientation = orientation_of(frame);
     note_tie(record);
     return;

@@ -94,13 +94,14 @@ def read_by_code():
                 if any(cpp.string(a[0]) for _, a in uses):
                     raise cpp.ListError(f"{file}: {name}() reads keys; say whose in SECTIONS of scripts/reference/keys.py")
                 continue
+            if list(cpp.calls(body, ("required_url",))):
+                for section in sections:
+                    found.setdefault((section, "url"), ("text", "", ""))
             for kind, a in uses:
                 key = cpp.string(a[0])
                 if key and re.fullmatch(r"\w+", key):
                     for section in sections:
                         add(found, (section, key), cells(kind, a, body, file))
-    for section in ("video", "pan_tilt", "mqtt"):
-        found.setdefault((section, "url"), ("text", "", ""))
     types = {"video": re.findall(r'\{VideoConfig::Type::k\w+, "(\w+)"', cpp.text_of("edge_app/config/video_config.cpp")),
              "pan_tilt": [*re.findall(r'\{"(\w+)", Type::k\w+', cpp.text_of("edge_app/config/pan_tilt_config.cpp")),
                           *re.findall(r'\{HeadType::k\w+, "(\w+)"', cpp.text_of("platform/pan_tilt/heads.h"))]}

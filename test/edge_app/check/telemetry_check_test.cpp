@@ -93,7 +93,7 @@ TEST(TelemetryCheck, MeasuresHowOftenADeviceMeasures) {
 
 TEST(TelemetryCheck, SaysWhatMaxRepeatHasToBe) {
   TelemetryNeeds needed = needs();
-  needed.max_repeat_s = 0;
+  needed.limits.max_repeat_s = 0;
   const TelemetryReport report =
       check(samples_of([](double t) { return swing(held(t, 5)); }), needed);
   // 1.2 times 200 ms.
@@ -165,7 +165,7 @@ TEST(TelemetryCheck, SaysThatSamplesAreTooFarApart) {
   for (PanTiltSample& sample : at_rest) sample.pan_rad = 0.1;
   EXPECT_THAT(problems(check(at_rest, needed).findings),
               ElementsAre(HasSubstr("angle is up to 268 ms old (95 %)")));
-  needed.max_repeat_s = 0.05;
+  needed.limits.max_repeat_s = 0.05;
   EXPECT_THAT(check(at_rest, needed).findings, IsEmpty());
   needed = needs();
   needed.rate_hz = 3;
