@@ -197,7 +197,10 @@ int run_live(const RunOptions& options) {
       sources.detectors = [&targets] { return targets->detectors(); };
   }
   sources.mqtt = mqtt.get();
-  if (scene) sources.scene = [&scene] { return scene->report(); };
+  if (scene) {
+    sources.scene = [&scene] { return scene->report(); };
+    sources.scene_outlines = &scene->outlines();
+  }
   sources.version = ALIDADE_VERSION;
   sources.camera = video->name();
   sources.latency_measured = of_pipeline.measure_latency;

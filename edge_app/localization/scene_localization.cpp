@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/calibration/number_text.h"
+#include "core/mapping/keyframe_outline.h"
 #include "core/model/rotation.h"
 #include "platform/system/clock.h"
 
@@ -74,6 +75,15 @@ LocalizationHint hint_of(const OrientationRecord& record, double zero_sigma, dou
   return hint;
 }
 
+std::vector<SceneOutline> outlines_of(const SceneMap& map) {
+  std::vector<SceneOutline> out;
+  for (const SceneKeyframe& keyframe : map.keyframes) {
+    out.push_back(
+        {keyframe.id, map.camera_of(keyframe).focal_length, keyframe_outline(map, keyframe)});
+  }
+  return out;
+}
+
 std::string describe(const BaseOffset& offset) {
   const auto of = [&offset](double value, int i) {
     return estimate_text(kMilli * value, kMilli * std::sqrt(offset.covariance(i, i)), "mrad");
@@ -92,6 +102,7 @@ SceneLocalization::SceneLocalization(SceneMap map, const std::string& name,
       range_(range),
       map_(std::move(map)),
       reference_row_(map_.reference_row),
+      outlines_(outlines_of(map_)),
       judge_(options),
       upkeep_(std::move(store)) {
   report_.name = name;

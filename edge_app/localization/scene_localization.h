@@ -11,6 +11,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "core/mapping/scene_map.h"
 #include "edge_app/localization/base_judge.h"
@@ -33,6 +34,8 @@ class SceneLocalization : public SceneLocator {
   void prepare() override;  // builds the index; frees the map unless it is kept up
   [[nodiscard]] Outcome look(const LocalizableFrame& frame, ToldBase* told) override;
 
+  // What the keyframes show, as read at the start. Any thread.
+  [[nodiscard]] const std::vector<SceneOutline>& outlines() const { return outlines_; }
   // Any thread but the real-time one.
   [[nodiscard]] SceneReport report() const;
 
@@ -52,6 +55,7 @@ class SceneLocalization : public SceneLocator {
   bool is_start_said_ = false;
   SceneMap map_;
   const double reference_row_;
+  const std::vector<SceneOutline> outlines_;
   std::unique_ptr<const SceneSearch> searcher_;
   BaseJudge judge_;
   SceneUpkeep upkeep_;

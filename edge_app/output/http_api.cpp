@@ -18,6 +18,7 @@
 #include "edge_app/output/plane_json.h"
 #include "edge_app/output/record_events.h"
 #include "edge_app/output/scene_json.h"
+#include "edge_app/output/scene_views_json.h"
 #include "edge_app/output/service_metrics.h"
 #include "edge_app/output/service_status.h"
 #include "edge_app/output/targets_json.h"
@@ -113,10 +114,16 @@ ServerResponse plane_fit(const HttpApiSources& sources, const std::string& body)
   return text_response("application/json", std::move(answer));
 }
 
+constexpr const char* kNoSceneMap =
+    "no scene map is in use: set scene_map.file to one of alidade map build";
+
+ServerResponse scene_views(const HttpApiSources& sources) {
+  if (sources.scene_outlines == nullptr) return http_error(404, kNoSceneMap);
+  return json_response(scene_views_json(*sources.scene_outlines));
+}
+
 ServerResponse scene_map(const HttpApiSources& sources) {
-  if (!sources.scene)
-    return http_error(404,
-                      "no scene map is in use: set scene_map.file to one of alidade map build");
+  if (!sources.scene) return http_error(404, kNoSceneMap);
   return json_response(scene_json(sources.scene(), monotonic_now_s()));
 }
 
@@ -363,6 +370,8 @@ void add_api_routes(HttpServer* server, const HttpApiSources& sources) {
       [sources](const ServerRequest& request) { return detections(sources, request.body); });
   server->get("/api/v1/map", HttpAccess::kToken,
               [sources](const ServerRequest&) { return scene_map(sources); });
+  server->get("/api/v1/map/views", HttpAccess::kToken,
+              [sources](const ServerRequest&) { return scene_views(sources); });
   server->post("/api/v1/calibrate", HttpAccess::kControl, kMaxQueryBytes,
                [sources, pause = std::make_shared<CalibrationPause>()](const ServerRequest&) {
                  return calibrate(sources, pause.get());

@@ -7,6 +7,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "core/ground/plane_estimate.h"
 #include "core/model/pupil.h"
@@ -46,6 +47,8 @@ struct HttpApiSources {
   std::function<DetectorsReport()> detectors;  // empty: no built-in detector
   const MqttPublisher* mqtt = nullptr;         // null: no broker
   std::function<SceneReport()> scene;          // empty: no scene map is in use
+  // What the scene map's keyframes show; null: no scene map is in use.
+  const std::vector<SceneOutline>* scene_outlines = nullptr;
   std::string version;
   std::string camera;            // name of the video source, without a password
   bool latency_measured = true;  // false for a recording

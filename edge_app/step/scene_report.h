@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "core/model/angle.h"
 #include "core/model/linear_algebra.h"
@@ -32,6 +33,13 @@ struct UpkeepReport {
   std::int64_t not_close = 0;  // landmarks not made: too far from all others
   std::int64_t hidden = 0;     // pictures in which too little was found to blame a landmark
   bool stopped = false;        // the file takes no more
+};
+
+// The part of the scene that a keyframe of the map shows.
+struct SceneOutline {
+  std::int64_t keyframe = 0;
+  double focal_length = 0;              // px
+  std::vector<Vector3<double>> border;  // unit vectors in the map's base, around the picture
 };
 
 struct SceneReport {

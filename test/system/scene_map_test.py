@@ -27,6 +27,11 @@ class WithSceneMap(SystemTest):
         with urllib.request.urlopen(address + "api/v1/map", timeout=30) as answer:
             state = json.load(answer)
         check(state, {"$ref": "#/components/schemas/SceneMap"})
+        with urllib.request.urlopen(address + "api/v1/map/views", timeout=30) as answer:
+            views = json.load(answer)
+        check(views, {"$ref": "#/components/schemas/SceneViews"})
+        self.assertEqual(len(views["keyframes"]), state["keyframes"])
+        self.assertTrue(all(len(one["border_rad"]) == 16 for one in views["keyframes"]))
         return state
 
     def build_map(self):

@@ -5,6 +5,7 @@ import {getJson} from './api.js';
 import {showCalibrationInUse} from './calibration.js';
 import {rows, say} from './elements.js';
 import {isNumber} from './numbers.js';
+import {showSceneMap} from './scene_map.js';
 import {connected} from './stream.js';
 import {duration, sleep} from './time.js';
 
@@ -80,6 +81,7 @@ export async function showStatusForEver() {
         const status = await getJson('/api/v1/status');
         showStatus(status);
         await showCalibrationInUse(status);
+        await showSceneMap(status);
       } catch {
         // The header says that the link is away; the next round asks again.
       }

@@ -8,6 +8,7 @@ import {showManualLink} from './manual.js';
 import {drawPicture, showPicturesForEver} from './picture.js';
 import {drawPlan} from './plan.js';
 import {drawPlots} from './plots.js';
+import {drawSceneMap} from './scene_map.js';
 import {showRecord} from './state.js';
 import {followForEver} from './stream.js';
 import {drawTelemetryError} from './telemetry_error.js';
@@ -17,6 +18,7 @@ function drawAll() {
   drawZoomCurve();
   drawTelemetryError();
   drawPlan();
+  drawSceneMap();
   drawPlots();
 }
 

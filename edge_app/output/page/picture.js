@@ -7,6 +7,7 @@ import {element, say} from './elements.js';
 import {drawLandmarks, sayLandmarks} from './landmarks.js';
 import {drawMarker, followMarker, sayMarker} from './marker.js';
 import {showView} from './plan.js';
+import {showPlaceInScene} from './scene_map.js';
 import {connected, kStale, onNewProcess, record, recordAt} from './stream.js';
 import {drawTargets} from './target_boxes.js';
 import {targets} from './targets.js';
@@ -44,6 +45,7 @@ async function showPicture() {
   if (!kept) await followMarker(frame);
   const told = targets ? await getJson(`/api/v1/targets?frame=${frame}`).catch(() => null) : null;
   if (told) await showView(frame, overlay);
+  await showPlaceInScene(frame, overlay);
   if (kept) return bitmap.close();
   picture?.bitmap.close();
   picture = {frame, bitmap, overlay, targets: told};

@@ -57,6 +57,7 @@ class HttpApiTest : public ::testing::Test {
       return body == "{}";
     };
     sources.scene = std::move(scene);
+    if (sources.scene) sources.scene_outlines = &outlines_;
     sources.version = "1.2.3";
     sources.camera = "a camera";
     add_api_routes(&server_, sources);
@@ -292,6 +293,7 @@ TEST_F(HttpApiTest, WithoutASceneMapSaysHowToHaveOne) {
   const std::string answer = get("/api/v1/map");
   EXPECT_THAT(answer, StartsWith("HTTP/1.1 404 "));
   EXPECT_THAT(body_of(answer)["error"].get<std::string>(), HasSubstr("set scene_map.file"));
+  EXPECT_THAT(get("/api/v1/map/views"), StartsWith("HTTP/1.1 404 "));
   EXPECT_THAT(get("/metrics"), Not(HasSubstr("alidade_scene_map")));
 }
 
@@ -301,6 +303,19 @@ class HttpApiWithSceneMapTest : public HttpApiTest {
 
   SceneReport report_;
 };
+
+TEST_F(HttpApiWithSceneMapTest, TellsWhatEachKeyframeShows) {
+  EXPECT_EQ(body_of(get("/api/v1/map/views")), json::parse(R"({"keyframes": []})"));
+  // Forward, to the right, down.
+  outlines_.push_back({7, 1200, {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}});
+  const json told = body_of(get("/api/v1/map/views"))["keyframes"];
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_EQ(told[0]["keyframe"], 7);
+  EXPECT_EQ(told[0]["focal_length_px"], 1200);
+  EXPECT_EQ(told[0]["border_rad"][0], json::parse("[0.0, 0.0]"));
+  EXPECT_NEAR(told[0]["border_rad"][1][0].get<double>(), kPi / 2, 1e-12);
+  EXPECT_NEAR(told[0]["border_rad"][2][1].get<double>(), -kPi / 2, 1e-12);
+}
 
 TEST_F(HttpApiWithSceneMapTest, TellsWhatLocalizationHasDone) {
   report_.name = "scene.map";
