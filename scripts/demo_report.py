@@ -258,6 +258,31 @@ def tag_table(tags):
                   "beyond detector px", "sigma told px"], rows)
 
 
+def tag_passes(tags, records):
+    """The tag's times in the picture: (indices into tags["frames"], whether the camera turns to the right meanwhile)."""
+    rate = {record["frame"]: record["pan_rate_rad_s"] for record in records}
+    frames = np.array(tags["frames"])
+    apart = np.flatnonzero(np.diff(frames) > 10) + 1  # more than some frames in which it was not found
+    return [(part, bool(np.median([rate[frame] for frame in frames[part] if frame in rate] or [0]) > 0))
+            for part in np.split(np.arange(len(frames)), apart)]
+
+
+def tag_clusters(tags, passes):
+    """Why the places lie in clusters, in numbers of this run."""
+    def apart(row):
+        places = np.array(row["places"])
+        means = [places[np.concatenate(parts)].mean(axis=0) for parts in
+                 ([part for part, right in passes if right == wanted] for wanted in (True, False)) if parts]
+        return f"{np.hypot(*(means[0] - means[1])):.3g} px in the row {row['name']}" if len(means) == 2 else ""
+    to_right = sum(right for _, right in passes)
+    text = (f"Of the tag's {len(passes)} passes through the picture {to_right} come while the camera turns to the right (dots) and "
+            f"{len(passes) - to_right} while it turns to the left (crosses), at another place in the picture. ")
+    if said := [one for one in map(apart, tags["rows"]) if one]:
+        text += ("What a row has late, or scaled, moves the tag along the motion or with its place. So the two ways are two clusters, whose "
+                 f"means are apart by {', '.join(said)}. The detector itself errs differently at the two places.")
+    return text
+
+
 def dome_tables(reality):
     """What alidade_reality says of one film of each camera: their calibrations, and OE mode with these."""
     cameras = {row["row"]: row["seeds"][0] for row in reality["rows"]}
@@ -390,8 +415,8 @@ def plot_latency(records, period_s, output):
     figure.savefig(output / "latency.png", dpi=110)
 
 
-def plot_tags(tags, output):
-    """Every row's places about their median, each in a scale of its own."""
+def plot_tags(tags, passes, output):
+    """Every row's places about their median, each in a scale of its own; dots and crosses: passes to the right and to the left."""
     rows = tags["rows"]
     figure, axes = plt.subplots(2, (len(rows) + 1) // 2, figsize=(11, 7.4))
     for axis in axes.ravel()[len(rows):]:
@@ -400,11 +425,12 @@ def plot_tags(tags, output):
         places = np.array(row["places"])
         places = places - np.median(places, axis=0)
         reach = 1.1 * np.abs(places).max()
-        axis.plot(places[:, 0], places[:, 1], ".", ms=4, color=colour)
+        for part, right in passes:
+            axis.plot(places[part, 0], places[part, 1], "." if right else "x", ms=4 if right else 5, color=colour)
         axis.set(aspect="equal", xlim=(-reach, reach), ylim=(reach, -reach), xlabel="u (px)", ylabel="v (px)")
         axis.set_title(f"{row['name']}\ntotal {row['total_px']:.2f} px", fontsize=9)
         axis.grid(True, alpha=0.3)
-    figure.suptitle("The tag of every frame, carried into one frame (scales differ)")
+    figure.suptitle("The tag of every frame, carried into one frame (scales differ); dots: the camera turns right, crosses: left")
     figure.tight_layout()
     figure.savefig(output / "tag.png", dpi=110)
 
@@ -449,12 +475,16 @@ def main():
     results = [result for result in results if len(result.times)]
     tags = json.loads(pathlib.Path(arguments.tags).read_text(encoding="utf-8"))
 
+    # The records whose frames are numbered as the recording's, in which the tag was looked for.
+    tags_reference = "OE with rolling shutter"
+
     arguments.output.mkdir(parents=True, exist_ok=True)
     plot_errors(results, events, first_s, truth, arguments.output)
     plot_angles(with_orientation, events, truth, path, first_s, arguments.output)
     plot_error_over_image(results[-1], truth, arguments.output)
     plot_latency(live, float(np.median(np.diff(path.time))), arguments.output)
-    plot_tags(tags, arguments.output)
+    passes = tag_passes(tags, next(result.records for result in results if result.name == tags_reference))
+    plot_tags(tags, passes, arguments.output)
 
     sections = [
         ("From the data sheet to OE mode, by itself",
@@ -472,7 +502,7 @@ def main():
          "that of the detector's own noise, which the true orientation of every frame shows. `sigma told`: what the records' own sigmas "
          "let expect. The rows but the live one are replays of a recording of the same streams, with the calibration found last; the live one "
          "has whatever was in force. A frame counts where all rows have it. "
-         "The virtual camera repeats its 250 pictures, so that noise is the same each time round.",
+         "The virtual camera repeats its 250 pictures, so that noise is the same each time round. " + tag_clusters(tags, passes),
          tag_table(tags), "tag"),
         ("All directions against the truth",
          f"Error of the direction of {GRID_COLUMNS * GRID_ROWS} pixels a frame. NEES is the normalised squared error of the "
