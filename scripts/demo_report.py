@@ -19,6 +19,7 @@ import sys
 import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
+import matplotlib.ticker
 import numpy as np
 import yaml
 
@@ -28,6 +29,8 @@ import calibration_errors
 R_FRD_FROM_RDF = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 GRID_COLUMNS, GRID_ROWS = 9, 7
 COLOURS = plt.rcParams["axes.prop_cycle"].by_key()["color"]
+# Their records' sigmas are those of a calibration that is wrong on purpose.
+UNTOLD = ("uncalibrated", "OE without rolling shutter")
 
 
 class Camera:
@@ -255,6 +258,31 @@ def tag_table(tags):
                   "beyond detector px", "sigma told px"], rows)
 
 
+def tag_passes(tags, records):
+    """The tag's times in the picture: (indices into tags["frames"], whether the camera turns to the right meanwhile)."""
+    rate = {record["frame"]: record["pan_rate_rad_s"] for record in records}
+    frames = np.array(tags["frames"])
+    apart = np.flatnonzero(np.diff(frames) > 10) + 1  # more than some frames in which it was not found
+    return [(part, bool(np.median([rate[frame] for frame in frames[part] if frame in rate] or [0]) > 0))
+            for part in np.split(np.arange(len(frames)), apart)]
+
+
+def tag_clusters(tags, passes):
+    """Why the places lie in clusters, in numbers of this run."""
+    def apart(row):
+        places = np.array(row["places"])
+        means = [places[np.concatenate(parts)].mean(axis=0) for parts in
+                 ([part for part, right in passes if right == wanted] for wanted in (True, False)) if parts]
+        return f"{np.hypot(*(means[0] - means[1])):.3g} px in the row {row['name']}" if len(means) == 2 else ""
+    to_right = sum(right for _, right in passes)
+    text = (f"Of the tag's {len(passes)} passes through the picture {to_right} come while the camera turns to the right (dots) and "
+            f"{len(passes) - to_right} while it turns to the left (crosses), at another place in the picture. ")
+    if said := [one for one in map(apart, tags["rows"]) if one]:
+        text += ("What a row has late, or scaled, moves the tag along the motion or with its place. So the two ways are two clusters, whose "
+                 f"means are apart by {', '.join(said)}. The detector itself errs differently at the two places.")
+    return text
+
+
 def dome_tables(reality):
     """What alidade_reality says of one film of each camera: their calibrations, and OE mode with these."""
     cameras = {row["row"]: row["seeds"][0] for row in reality["rows"]}
@@ -284,15 +312,50 @@ def mark(axis, events, first_s):
             axis.axvline(events[name]["receive_time_s"] - first_s, color="k", ls=style, lw=1, label=name)
 
 
-def plot_errors(results, events, first_s, output):
-    figure, axis = plt.subplots(figsize=(10, 4.6))
-    for result, colour in zip(results, COLOURS):
-        axis.semilogy(result.times - first_s, result.per_frame, ".", ms=3, color=colour, label=result.name)
-    mark(axis, events, first_s)
-    axis.set(xlabel="s since the first frame", ylabel="direction error, RMS over the image (px)",
-             title="Error of every frame against truth")
-    axis.grid(True, which="both", alpha=0.3)
-    axis.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncol=3, fontsize=8)
+def plain(value, _):
+    """A tick's number as people write it: 0.05, 2, 100."""
+    return f"{value:g}"
+
+
+def plain_axis(axis, numbers, unit=""):
+    """A logarithmic axis with a number at each of its ticks, in place of powers of ten."""
+    axis.set_major_locator(matplotlib.ticker.LogLocator(base=10, subs=numbers))
+    axis.set_major_formatter(lambda value, place: plain(value, place) + unit)
+    axis.set_minor_formatter(matplotlib.ticker.NullFormatter())
+
+
+def told_band(result, truth):
+    """Between which errors (px) nine of ten frames should lie by the orientation sigmas that their records tell: the 5th and the 95th
+    percentile of the length of a Gaussian vector, as the median of a second."""
+    sigma_px = np.array([np.sqrt(np.mean(np.square(r["orientation_sigma_rad"][:2]))) for r in result.records]) * truth.focal_length
+    half = 12
+    smooth = np.array([np.median(sigma_px[max(0, i - half):i + half + 1]) for i in range(len(sigma_px))])
+    return smooth * math.sqrt(-2 * math.log(0.95)), smooth * math.sqrt(-2 * math.log(0.05))
+
+
+def plot_errors(results, events, first_s, truth, output):
+    """Replays above, `alidade run` below; the colour of a mode is the same in both."""
+    colour_of = {"uncalibrated": COLOURS[0], "PT": COLOURS[1], "OE without rolling shutter": COLOURS[2],
+                 "OE with rolling shutter": COLOURS[3], "live, before": COLOURS[0], "live, calibrated, PT": COLOURS[1],
+                 "live, calibrated, OE": COLOURS[3]}
+    figure, axes = plt.subplots(2, 1, figsize=(10, 8.4), sharex=True, sharey=True)
+    for axis, is_live in zip(axes, (False, True)):
+        for result in results:
+            if result.name.startswith("live") != is_live:
+                continue
+            colour = colour_of[result.name]
+            axis.semilogy(result.times - first_s, result.per_frame, ".", ms=3, color=colour, label=result.name)
+            if all(record["calibrated"] for record in result.records) and result.name not in UNTOLD:
+                axis.fill_between(result.times - first_s, *told_band(result, truth), color=colour, alpha=0.18, lw=0)
+        if is_live:
+            mark(axis, events, first_s)
+        plain_axis(axis.yaxis, (1.0, 3.0))
+        axis.set(ylabel="direction error (px)", title="alidade run, live" if is_live else "Replays of a recording")
+        axis.grid(True, alpha=0.3)
+        axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=8, title="band: 9 of 10 frames\nby the told sigma",
+                    title_fontsize=8)
+    axes[1].set(xlabel="s since the first frame")
+    figure.suptitle("Error of every frame against truth, RMS over the image")
     figure.tight_layout()
     figure.savefig(output / "error-over-time.png", dpi=110)
 
@@ -317,17 +380,21 @@ def plot_error_over_image(result, truth, output):
     figure, axis = plt.subplots(figsize=(8, 4.8))
     mean = result.errors.mean(axis=0)
     spread = np.sqrt((result.errors**2).sum(2).mean(0))
-    scatter = axis.scatter(result.pixels[:, 0], result.pixels[:, 1], c=spread, s=70, cmap="viridis")
-    axis.quiver(result.pixels[:, 0], result.pixels[:, 1], mean[:, 0], mean[:, 1], angles="xy", color="crimson", width=0.003)
+    # From 0 on, so that a colour means a size: a scale from the least to the largest would show hundredths of a pixel as extremes.
+    scatter = axis.scatter(result.pixels[:, 0], result.pixels[:, 1], c=spread, s=70, cmap="viridis", vmin=0, vmax=1.25 * spread.max())
+    # An arrow as long as the largest RMS is as long as the pixels of the grid are apart.
+    arrows = axis.quiver(result.pixels[:, 0], result.pixels[:, 1], mean[:, 0], mean[:, 1], angles="xy", scale_units="xy",
+                         scale=spread.max() * GRID_COLUMNS / truth.width, color="crimson", width=0.003)
+    axis.quiverkey(arrows, 0.86, 1.04, spread.max(), f"{spread.max():.2f} px", labelpos="E", coordinates="axes")
     figure.colorbar(scatter, label="RMS error (px)")
-    axis.set(xlim=(0, truth.width), ylim=(truth.height, 0), aspect="equal", xlabel="u (px)", ylabel="v (px)",
-             title=f"{result.name}: mean error (arrows, longest {np.hypot(*mean.T).max():.2f} px) and RMS")
+    axis.set(xlim=(0, truth.width), ylim=(truth.height, 0), aspect="equal", xlabel="u (px)", ylabel="v (px)")
+    axis.set_title(f"{result.name}: mean error (arrows) and RMS (colour)", loc="left", fontsize=10)
     figure.tight_layout()
     figure.savefig(output / "error-over-image.png", dpi=110)
 
 
-def plot_latency(records, output):
-    figure, axis = plt.subplots(figsize=(8, 3.6))
+def plot_latency(records, period_s, output):
+    figure, axis = plt.subplots(figsize=(9, 4))
     kinds = {}
     for record in records:
         if record["latency_s"] is not None:
@@ -336,17 +403,20 @@ def plot_latency(records, output):
     for name, values in kinds.items():
         if len(values) >= 5:
             later = 1 - np.arange(len(values)) / len(values)
-            axis.step(np.sort(values), later, where="post", label=f"{name} ({len(values)} frames)")
-    axis.set(xscale="log", yscale="log", xlabel="frame received to record made (ms)", ylabel="share of frames that are later",
+            axis.step(np.sort(values), 100 * later, where="post", label=f"{name} ({len(values)} frames)")
+    axis.axvline(1e3 * period_s, color="0.5", ls=":", lw=1, label=f"the next frame comes ({1e3 * period_s:.0f} ms)")
+    axis.set(xscale="log", yscale="log", xlabel="from the frame's arrival to its record", ylabel="frames that take longer",
              title="Latency")
+    plain_axis(axis.xaxis, (1.0, 2.0, 5.0), " ms")
+    plain_axis(axis.yaxis, (1.0, 3.0), " %")
     axis.legend(fontsize=8)
-    axis.grid(True, which="both", alpha=0.3)
+    axis.grid(True, alpha=0.3)
     figure.tight_layout()
     figure.savefig(output / "latency.png", dpi=110)
 
 
-def plot_tags(tags, output):
-    """Every row's places about their median, each in a scale of its own."""
+def plot_tags(tags, passes, output):
+    """Every row's places about their median, each in a scale of its own; dots and crosses: passes to the right and to the left."""
     rows = tags["rows"]
     figure, axes = plt.subplots(2, (len(rows) + 1) // 2, figsize=(11, 7.4))
     for axis in axes.ravel()[len(rows):]:
@@ -355,11 +425,12 @@ def plot_tags(tags, output):
         places = np.array(row["places"])
         places = places - np.median(places, axis=0)
         reach = 1.1 * np.abs(places).max()
-        axis.plot(places[:, 0], places[:, 1], ".", ms=4, color=colour)
+        for part, right in passes:
+            axis.plot(places[part, 0], places[part, 1], "." if right else "x", ms=4 if right else 5, color=colour)
         axis.set(aspect="equal", xlim=(-reach, reach), ylim=(reach, -reach), xlabel="u (px)", ylabel="v (px)")
         axis.set_title(f"{row['name']}\ntotal {row['total_px']:.2f} px", fontsize=9)
         axis.grid(True, alpha=0.3)
-    figure.suptitle("The tag of every frame, carried into one frame (scales differ)")
+    figure.suptitle("The tag of every frame, carried into one frame (scales differ); dots: the camera turns right, crosses: left")
     figure.tight_layout()
     figure.savefig(output / "tag.png", dpi=110)
 
@@ -404,12 +475,16 @@ def main():
     results = [result for result in results if len(result.times)]
     tags = json.loads(pathlib.Path(arguments.tags).read_text(encoding="utf-8"))
 
+    # The records whose frames are numbered as the recording's, in which the tag was looked for.
+    tags_reference = "OE with rolling shutter"
+
     arguments.output.mkdir(parents=True, exist_ok=True)
-    plot_errors(results, events, first_s, arguments.output)
+    plot_errors(results, events, first_s, truth, arguments.output)
     plot_angles(with_orientation, events, truth, path, first_s, arguments.output)
     plot_error_over_image(results[-1], truth, arguments.output)
-    plot_latency(live, arguments.output)
-    plot_tags(tags, arguments.output)
+    plot_latency(live, float(np.median(np.diff(path.time))), arguments.output)
+    passes = tag_passes(tags, next(result.records for result in results if result.name == tags_reference))
+    plot_tags(tags, passes, arguments.output)
 
     sections = [
         ("From the data sheet to OE mode, by itself",
@@ -427,11 +502,12 @@ def main():
          "that of the detector's own noise, which the true orientation of every frame shows. `sigma told`: what the records' own sigmas "
          "let expect. The rows but the live one are replays of a recording of the same streams, with the calibration found last; the live one "
          "has whatever was in force. A frame counts where all rows have it. "
-         "The virtual camera repeats its 250 pictures, so that noise is the same each time round.",
+         "The virtual camera repeats its 250 pictures, so that noise is the same each time round. " + tag_clusters(tags, passes),
          tag_table(tags), "tag"),
         ("All directions against the truth",
          f"Error of the direction of {GRID_COLUMNS * GRID_ROWS} pixels a frame. NEES is the normalised squared error of the "
-         "orientation at row 0: 1 when the reported sigma is honest, below it when errors are smaller than told.",
+         "orientation at row 0: 1 when the reported sigma is honest, below it when errors are smaller than told. "
+         "The bands of the picture say where nine of ten frames should lie by the sigmas that the records tell.",
          error_table(results), "error-over-time"),
         ("Latency", "From the arrival of a frame's last packet to its record, live, by what the calibration thread did meanwhile.",
          latency_table(live), "latency"),

@@ -11,6 +11,7 @@
 #include "core/calibration/sufficiency.h"
 #include "core/calibration/telemetry_fit.h"
 #include "core/model/median.h"
+#include "core/model/recording_needs.h"
 
 namespace alidade::internal {
 
@@ -116,7 +117,7 @@ StageStatus find_motion(const CalibrationInput& input, const CalibrationOptions&
                       clocks.telemetry.steady ? 0 : clocks.telemetry.stamp_sigma_s, *smooth,
                       &telemetry);
 
-  const auto image = image_motion(selected->data, 0.5);
+  const auto image = image_motion(selected->data, kLandmarkStep_s);
   const double centre = options.clock_offset ? options.clock_offset->value : 0;
   double range = options.clock_offset_search_s;
   for (;; range *= 2) {

@@ -9,31 +9,20 @@
 
 #include "core/calibration/correlation.h"
 #include "core/calibration/number_text.h"
+#include "core/model/recording_needs.h"
 
 namespace alidade::internal {
 
 namespace {
 
-// Limits of use. An error of the clock offset acts at the mount's rate, one of the others over half
-// an image.
-constexpr double kMinImageMotion_px = 5;   // in half a second
-constexpr double kMinCorrelation = 0.6;    // of image motion and telemetry
-constexpr double kMinTravelShare = 0.03;   // of the image's width, for each axis
-constexpr double kGoodTravelShare = 0.25;  // asked for where there was less
+constexpr double kMinCorrelation = 0.6;  // of image motion and telemetry
 // Of an axis from its nominal direction; calibration.yaml holds no more.
 constexpr double kMaxAxisTurn = 60 * kPi / 180;
-constexpr double kMinRateVariation = 0.05;     // of the largest rate
-constexpr double kMaxFieldOfViewRatio = 0.2;   // least focal length / width: 136 deg
-constexpr double kMaxFocalLengthError = 0.05;  // relative
-constexpr double kMaxClockOffsetError_s = 0.01;
-constexpr double kMaxReadoutError_s = 5e-3;  // from the first to the last row
-// Of parts of the recording, in units of what noise explains, where no cause shows.
-constexpr double kMaxScatter = 30;
-constexpr double kMaxDistortionError = 0.02;  // of the distance from the centre, in the corner
+constexpr double kMaxFieldOfViewRatio = 0.2;  // least focal length / width: 136 deg
 
-std::string text(const char* format, double a, double b = 0) {
+std::string text(const char* format, double a, double b = 0, double c = 0) {
   char buffer[320];
-  std::snprintf(buffer, sizeof buffer, format, a, b);
+  std::snprintf(buffer, sizeof buffer, format, a, b, c);
   return buffer;
 }
 
@@ -163,18 +152,22 @@ CalibrationStatus check_motion(const std::vector<ImageMotion>& motion,
                                const TrajectorySpline& telemetry, const MotionMatch& match,
                                const CalibrationInput& input, std::string* why) {
   if (motion.size() < 3) {
-    *why =
-        "hardly any two frames half a second apart share three landmarks: track landmarks longer, "
-        "or move by less than half a picture in that time";
+    *why = text(
+        "hardly any two frames %g s apart share three landmarks: track landmarks longer, or "
+        "move by less than %g %% of the picture in that time",
+        kLandmarkStep_s, 100 * kLandmarkStepMost);
     return CalibrationStatus::kTooFewLandmarks;
   }
   double largest_shift = 0;
   for (const ImageMotion& m : motion) largest_shift = std::max(largest_shift, m.shift.norm());
   if (largest_shift < kMinImageMotion_px) {
-    *why = text(
-        "the image moves by no more than %.1f px in half a second: pan and tilt while recording, "
-        "best along a figure that crosses the field of view in some seconds",
-        largest_shift);
+    *why = text("the image moves by no more than %.1f px in %g s; %g px or more are needed: ",
+                largest_shift, kLandmarkStep_s, kMinImageMotion_px) +
+           text(
+               "pan and tilt for %g s or more while recording, best along an eight of %g fields of "
+               "view in pan and %g in tilt, ",
+               kCalibrationAsked_s, kPanAsked_fields, kTiltAsked_fields) +
+           text("crossing one in %g to %g s", kFieldFastest_s, kFieldSlowest_s);
     return CalibrationStatus::kNoMotion;
   }
   const MotionExtent extent = measure_motion(telemetry, times_beside(motion, telemetry, match));
@@ -191,9 +184,11 @@ CalibrationStatus check_motion(const std::vector<ImageMotion>& motion,
   // Only if image and telemetry correlate: otherwise the rates may be smoothed noise.
   if (match.correlation > kMinCorrelation &&
       extent.varying_rate.norm() < kMinRateVariation * rate) {
-    *why =
+    *why = text(
         "pan and tilt move at constant velocity, so clock offset and line delay cannot be told "
-        "from a rotated scene; change speed and direction a few times";
+        "from a rotated scene: the speed changes by %.1f %% of the largest, %g %% or more are "
+        "needed; change speed and direction a few times",
+        100 * extent.varying_rate.norm() / rate, 100 * kMinRateVariation);
     return CalibrationStatus::kConstantVelocity;
   }
   if (match.apart) {
@@ -249,29 +244,31 @@ void judge(const CalibrationOptions& options, const MotionExtent& motion,
   }
   if (f_error > kMaxFocalLengthError && !scale_from_prior) {
     reasons.push_back(
-        text("focal length known to %.1f %% only: move farther on both axes", 100 * f_error));
+        text("focal length known to %.1f %% only, %g %% are needed: move farther on both axes",
+             100 * f_error, 100 * kMaxFocalLengthError));
   }
   const double d_error = parameter_sigma(c, Parameter::kClockOffset);
   if (d_error > kMaxClockOffsetError_s) {
     reasons.push_back(
-        text("clock offset known to %.1f ms only (largest rate %.3f rad/s): change speed and "
-             "direction more and faster",
-             1e3 * d_error, motion.largest_rate.norm()));
+        text("clock offset known to %.1f ms only, %g ms are needed (largest rate %.3f rad/s): "
+             "change speed and direction more and faster",
+             1e3 * d_error, 1e3 * kMaxClockOffsetError_s, motion.largest_rate.norm()));
   }
   const double readout_error = parameter_sigma(c, Parameter::kLineDelay) * c.camera.height;
   if (readout_error > kMaxReadoutError_s) {
     reasons.push_back(
-        text("read-out known to %.1f ms only: move faster while the image is read out",
-             1e3 * readout_error));
+        text("read-out known to %.1f ms only, %g ms are needed: move faster while the image is "
+             "read out",
+             1e3 * readout_error, 1e3 * kMaxReadoutError_s));
   }
   static_assert(kDistortionCount == 1, "each term is to be known well enough");
   const double distortion_error =
       parameter_sigma(c, Parameter::kRadialDistortion) / corner_unit(c.camera)[0];
   if (distortion_error > kMaxDistortionError) {
     reasons.push_back(
-        text("radial distortion known to %.1f %% of the radius only: let landmarks cross the whole "
-             "image",
-             100 * distortion_error));
+        text("radial distortion known to %.1f %% of the radius only, %g %% are needed: let "
+             "landmarks cross the whole image",
+             100 * distortion_error, 100 * kMaxDistortionError));
   }
   for (const Parameter p :
        {Parameter::kPanAxis0, Parameter::kPanAxis1, Parameter::kTiltAxis0, Parameter::kTiltAxis1}) {
@@ -307,6 +304,7 @@ void judge(const CalibrationOptions& options, const MotionExtent& motion,
   for (const auto& reason : reasons) {
     result->message += (result->message.empty() ? "" : "; ") + reason;
   }
+  result->message += text("; record for longer, too: %g s", kCalibrationBetter_s);
 }
 
 }  // namespace alidade::internal

@@ -10,14 +10,15 @@
 #include <vector>
 
 #include "core/model/angle.h"
+#include "core/model/recording_needs.h"
 
 namespace alidade {
 
 struct KeyframeChoiceOptions {
-  double step_fields = 0.35;         // of pan and tilt, in fields of view
-  double step_log_f = 0.35;          // of log f
-  double most_motion_px = 10;        // of the image, during the read-out of all rows
-  double most_log_f_change = 0.002;  // during the read-out of all rows
+  double step_fields = 0.35;               // of pan and tilt, in fields of view
+  double step_log_f = 0.35;                // of log f
+  double most_motion_px = kSlowMotion_px;  // of the image, during the read-out of all rows
+  double most_log_f_change = 0.002;        // during the read-out of all rows
 
   [[nodiscard]] bool validate(const char** error = nullptr) const {
     const char* what = nullptr;  // *error, if not null, is set only when the result is false

@@ -172,6 +172,94 @@ Shapes shapes_of(const KnownPattern& pattern) {
   return circles(pattern);
 }
 
+const char* kind_name(PatternKind kind) {
+  switch (kind) {
+    case PatternKind::kChessboard:
+      return "chessboard";
+    case PatternKind::kAsymmetricCircles:
+      return "circles";
+    case PatternKind::kSymmetricCircles:
+      return "symmetric-circles";
+    case PatternKind::kAprilGrid:
+      return "aprilgrid";
+    case PatternKind::kCharuco:
+      break;
+  }
+  return "charuco";
+}
+
+// As parse_pattern() reads it.
+std::string name_of(const KnownPattern& pattern) {
+  char text[120];
+  std::snprintf(text, sizeof text, "%s:%dx%d:%gmm", kind_name(pattern.kind), pattern.columns,
+                pattern.rows, 1000 * pattern.size_m);
+  std::string name = text;
+  if (pattern.kind == PatternKind::kAprilGrid) {
+    std::snprintf(text, sizeof text, ":%g", pattern.gap);
+    name += text;
+  } else if (pattern.kind == PatternKind::kCharuco) {
+    std::snprintf(text, sizeof text, ":%gmm:%s", 1000 * pattern.marker_m,
+                  kMarkerDictionaries[static_cast<std::size_t>(pattern.dictionary)].name);
+    name += text;
+  }
+  return name;
+}
+
+// What a person measures to know that size, in words.
+const char* size_name(PatternKind kind) {
+  switch (kind) {
+    case PatternKind::kAsymmetricCircles:
+      return "half the distance of two circles in a row";
+    case PatternKind::kSymmetricCircles:
+      return "the distance of two neighbouring circles";
+    case PatternKind::kAprilGrid:
+      return "the side of a tag with its black border";
+    case PatternKind::kChessboard:
+    case PatternKind::kCharuco:
+      break;
+  }
+  return "the side of a square";
+}
+
+constexpr double kRuler_mm = 100;
+constexpr double kCaption_mm = 16;  // height of ruler and caption, with the white above them
+
+// A ruler and two lines of text, from the upper left corner on; unit: mm. No rectangle and no
+// circle, as these are the pattern's.
+std::string caption_of(const KnownPattern& pattern, const Shapes& shapes,
+                       const std::string& paper) {
+  constexpr double kLine_mm = 7;  // of the ruler, from the top
+  char text[400];
+  std::string ticks;
+  for (int mm = 0; mm <= kRuler_mm; ++mm) {
+    std::snprintf(text, sizeof text, "M%d %gv%g", mm, kLine_mm,
+                  mm % 50 == 0   ? -2.6
+                  : mm % 10 == 0 ? -1.8
+                                 : -0.9);
+    ticks += text;
+  }
+  std::snprintf(text, sizeof text,
+                "<path fill=\"none\" stroke=\"#555\" stroke-width=\"0.15\" d=\"");
+  std::string out = text + ticks;
+  std::snprintf(
+      text, sizeof text,
+      "M0 %gh%g\"/>\n<g font-family=\"sans-serif\" font-size=\"2.6\" fill=\"#333\">\n"
+      "<text x=\"%g\" y=\"%g\">%g mm: measure this line. If it is not %g mm long, print at "
+      "100 %%.</text>\n",
+      kLine_mm, kRuler_mm, kRuler_mm + 2, kLine_mm, kRuler_mm, kRuler_mm);
+  out += text;
+  const std::string name = name_of(pattern);
+  std::snprintf(text, sizeof text,
+                "<text x=\"0\" y=\"11\">Alidade --pattern %s, %.0f x %.0f mm on %s</text>\n",
+                name.c_str(), shapes.width_mm, shapes.height_mm, paper.c_str());
+  out += text;
+  std::snprintf(text, sizeof text,
+                "<text x=\"0\" y=\"14.6\">%gmm is %s. If another length is measured on paper, give "
+                "that one.</text>\n</g>\n",
+                1000 * pattern.size_m, size_name(pattern.kind));
+  return out + text;
+}
+
 // Width and height between the margins, mm. Landscape if the pattern is wider than high.
 std::pair<double, double> room_on(const Paper& paper, const Shapes& shapes) {
   const double width = paper.width_mm - 2 * kMargin_mm;
@@ -211,13 +299,28 @@ std::optional<std::string> draw_pattern(const KnownPattern& pattern, const std::
   const auto [room_width, room_height] = room_on(sheet, shapes);
   const double width = room_width + 2 * kMargin_mm;
   const double height = room_height + 2 * kMargin_mm;
+  const bool below = shapes.height_mm + kCaption_mm <= room_height;
+  const bool beside = !below && shapes.width_mm + kCaption_mm <= room_width;
+  const double left = (width - shapes.width_mm - (beside ? kCaption_mm : 0)) / 2;
+  const double top = (height - shapes.height_mm - (below ? kCaption_mm : 0)) / 2;
   std::snprintf(text, sizeof text,
                 "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"%.1fmm\" height=\"%.1fmm\" "
                 "viewBox=\"0 0 %.1f %.1f\">\n"
                 "<g transform=\"translate(%.3f %.3f)\" shape-rendering=\"geometricPrecision\">\n",
-                width, height, width, height, (width - shapes.width_mm) / 2,
-                (height - shapes.height_mm) / 2);
-  return text + shapes.svg + "</g>\n</svg>\n";
+                width, height, width, height, left, top);
+  std::string page = text + shapes.svg + "</g>\n";
+  if (below || beside) {
+    // At the edge of the paper, far from the pattern, which wants white around.
+    if (below) {
+      std::snprintf(text, sizeof text, "<g transform=\"translate(%.3f %.3f)\">\n", 2 * kMargin_mm,
+                    height - kMargin_mm - kCaption_mm);
+    } else {
+      std::snprintf(text, sizeof text, "<g transform=\"translate(%.3f %.3f) rotate(-90)\">\n",
+                    width - kMargin_mm - kCaption_mm, height - 2 * kMargin_mm);
+    }
+    page += text + caption_of(pattern, shapes, paper) + "</g>\n";
+  }
+  return page + "</svg>\n";
 }
 
 }  // namespace alidade

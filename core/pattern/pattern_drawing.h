@@ -1,5 +1,7 @@
 #pragma once
-// A known pattern as an SVG page in true size, for printing at 100 %. Pure text.
+// A known pattern as an SVG page in true size, for printing at 100 %. Below or beside it a caption
+// says what it is, and a ruler shows whether the printer kept the size. They are left out where the
+// paper has no room for them. Pure text.
 
 #include <optional>
 #include <string>

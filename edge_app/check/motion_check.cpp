@@ -5,15 +5,15 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "core/calibration/number_text.h"
+#include "core/model/recording_needs.h"
 #include "edge_app/check/motion_fit.h"
 
 namespace alidade {
 namespace {
 
-constexpr double kMoved_px = 2;     // root mean square over a baseline
-constexpr double kLeastTimes = 8;   // baselines without overlap
 constexpr double kExplained = 0.8;  // of an axis's motion
 // Of what this sign explains: the most that the other sign may explain.
 constexpr double kUnlike = 0.8;
@@ -23,7 +23,7 @@ AxisVerdict judge_axis(const MotionSearch& search, std::size_t best, std::size_t
   const MotionFit& fit = search.fits[best];
   const MotionSums& sums = fit.own[axis];
   const auto used = static_cast<double>(std::max<std::size_t>(fit.used, 1));
-  if (std::sqrt(fit.mm[axis] / used) < kMoved_px) return AxisVerdict::kNotMoved;
+  if (std::sqrt(fit.mm[axis] / used) < kCheckMotionLeast_px) return AxisVerdict::kNotMoved;
   if (share(sums.explained(), fit.mm[axis]) < kExplained) return AxisVerdict::kUnclear;
   const int sign = sums.mp > 0 ? 1 : -1;
   std::array<int, 2> reversed = {0, 0};
@@ -154,9 +154,10 @@ MotionReport check_measured_motion(const std::vector<TimedShift>& shifts,
   double squares = 0;
   for (const TimedShift& motion : motions) squares += motion.shift.squaredNorm();
   // The motions overlap by half.
-  const bool enough = 0.5 * static_cast<double>(motions.size()) >= kLeastTimes;
+  const bool enough = 0.5 * static_cast<double>(motions.size()) >= kCheckBaselinesLeast;
   report.image_moved =
-      !motions.empty() && std::sqrt(squares / static_cast<double>(motions.size())) >= kMoved_px;
+      !motions.empty() &&
+      std::sqrt(squares / static_cast<double>(motions.size())) >= kCheckMotionLeast_px;
   if (!enough) return report;
   if (!report.image_moved || !report.head_moved) {
     judge_presence(&report, image_range(shifts), head.range(), needs);
@@ -168,7 +169,7 @@ MotionReport check_measured_motion(const std::vector<TimedShift>& shifts,
     report.pan = report.tilt = AxisVerdict::kNotJudged;
     return report;
   }
-  const MotionSearch search(motions, head, needs.clock_offset_s, kLeastTimes);
+  const MotionSearch search(motions, head, needs.clock_offset_s, kCheckBaselinesLeast);
   if (search.fits.empty()) return report;
   const auto score = [](const MotionFit& at) { return explained(at, {0, 0}); };
   const std::size_t best = search.best(score);
@@ -207,13 +208,17 @@ MotionReport check_measured_motion(const std::vector<TimedShift>& shifts,
 
 ReportLines describe(const MotionReport& report) {
   if (!report.image_moved || !report.head_moved) {
-    const char* text =
+    std::string text =
         report.head_moved
             ? "the head turned, but no motion was seen in the picture: signs are not checked"
         : report.image_moved
             ? "the picture moves, but not the head: signs are not checked"
-            : "the camera did not move: turn it during the check to have signs checked";
-    return {{"motion", text}};
+            : fmt::format(
+                  "the camera did not move: turn it to and fro for {:g} s or more during "
+                  "the check, so that the picture moves by {:g} px or more in {:g} s, to "
+                  "have signs checked",
+                  kCheckBaselinesLeast * kCheckBaseline_s, kCheckMotionLeast_px, kCheckBaseline_s);
+    return {{"motion", std::move(text)}};
   }
   if (!report.not_judged.empty()) {
     return {{"motion", "signs are not judged: " + report.not_judged}};

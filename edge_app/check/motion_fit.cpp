@@ -4,12 +4,12 @@
 #include <cmath>
 
 #include "core/model/angle.h"
+#include "core/model/recording_needs.h"
 #include "edge_app/self_calibration/stale_repeats.h"
 
 namespace alidade {
 namespace {
 
-constexpr double kBaseline_s = 0.3;
 constexpr double kStep_s = 0.01;
 constexpr int kFirstSteps = 100;       // to both sides
 constexpr double kWell = 0.9;          // of the motion
@@ -84,15 +84,16 @@ std::vector<TimedShift> over_baseline(const std::vector<TimedShift>& shifts) {
     TimedShift motion = shifts[begin];
     std::size_t end = begin + 1;
     next_begin = begin + 1;
-    while (end < shifts.size() && motion.to_s - motion.from_s < kBaseline_s &&
+    while (end < shifts.size() && motion.to_s - motion.from_s < kCheckBaseline_s &&
            shifts[end].from_s == motion.to_s) {
-      if (motion.to_s - motion.from_s < kBaseline_s / 2) next_begin = end;
+      if (motion.to_s - motion.from_s < kCheckBaseline_s / 2) next_begin = end;
       motion.to_s = shifts[end].to_s;
       motion.shift += shifts[end].shift;
       ++end;
     }
     const double length_s = motion.to_s - motion.from_s;
-    if (length_s >= kBaseline_s && length_s < 3 * kBaseline_s && all_finite(motion.shift)) {
+    if (length_s >= kCheckBaseline_s && length_s < 3 * kCheckBaseline_s &&
+        all_finite(motion.shift)) {
       motions.push_back(motion);
     }
   }

@@ -108,11 +108,12 @@ void judge_bounds(TelemetryReport* report, const TelemetryNeeds& needs) {
   if (error_px <= kFarthest_px) return;
   add_advice(
       &report->findings,
-      fmt::format("pan/tilt {}: an angle's time is known to {:.0f} ms only; at the {:.1f} deg/s "
-                  "measured that is up to {:.0f} px, more than the {:.0f} px within which OE mode "
-                  "looks for landmarks: use a faster link to the head, or turn more slowly",
-                  needs.source, 1e3 * report->bounds_s->median, kDegrees * rate, error_px,
-                  kFarthest_px));
+      fmt::format(
+          "pan/tilt {}: an angle's time is known to {:.0f} ms only; at the {:.1f} deg/s "
+          "measured that is up to {:.0f} px, more than the {:.0f} px within which OE mode "
+          "looks for landmarks: use a faster link to the head, or turn at {:.1f} deg/s or less",
+          needs.source, 1e3 * report->bounds_s->median, kDegrees * rate, error_px, kFarthest_px,
+          kDegrees * rate * kFarthest_px / error_px));
 }
 
 void judge_zoom(TelemetryReport* report, const TelemetryNeeds& needs) {

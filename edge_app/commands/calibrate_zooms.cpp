@@ -18,6 +18,7 @@
 #include "edge_app/commands/visible_calibration.h"
 #include "edge_app/output/calibration_json.h"
 #include "edge_app/output/calibration_report.h"
+#include "edge_app/output/zoom_report.h"
 #include "edge_app/storage/calibration_file.h"
 #include "platform/system/text.h"
 
@@ -136,10 +137,12 @@ std::vector<Calibration> nodes_of(const ZoomCurve& curve) {
 
 // What the tracks show while the zoom moves. calibration_of: each job's index in `calibrations`, if
 // it was calibrated.
+// Appends to *told what the report says of each of them.
 std::vector<MovementObservation> observe_movements(
     const std::vector<CalibrationJob>& jobs,
     const std::vector<std::optional<std::size_t>>& calibration_of,
-    const std::vector<Calibration>& calibrations, const ZoomCurve& curve) {
+    const std::vector<Calibration>& calibrations, const ZoomCurve& curve,
+    std::vector<ZoomReportMovement>* told) {
   std::vector<MovementObservation> observations;
   const std::vector<double> readings = readings_between(calibrations);
   for (std::size_t i = 1; i < jobs.size(); ++i) {
@@ -150,8 +153,10 @@ std::vector<MovementObservation> observe_movements(
     if (!observe_movement(*movement, curve, readings, &observation, &error)) {
       spdlog::warn("{}: the zoom's movement from {:g} to {:g} is left out: {}", jobs[i].recording,
                    movement->from.zoom, movement->to.zoom, error);
+      told->push_back({movement->from.zoom, movement->to.zoom, {}, error});
       continue;
     }
+    told->push_back({movement->from.zoom, movement->to.zoom, observation, {}});
     observation.from = calibration_of[i - 1];
     observation.to = calibration_of[i];
     observations.push_back(std::move(observation));
@@ -169,22 +174,28 @@ int calibrate_zooms(const CalibrateOptions& options, std::vector<CalibrationJob>
   std::vector<Calibration> calibrations;
   std::vector<std::optional<std::size_t>> calibration_of(jobs.size());
   ZoomFitOptions fit_options;
+  std::vector<ZoomReportDwell> dwells;
   const std::string now = fmt::format("{:%Y-%m-%d %H:%M} UTC", fmt::gmtime(std::time(nullptr)));
   for (std::size_t i = 0; i < jobs.size(); ++i) {
     CalibrationJob& job = jobs[i];
     const std::string name = fmt::format("{} at zoom {:g}", job.recording, *job.zoom);
     CalibrationResult result = calibrate_job(options.passes, &job, signals);
     for (const std::string& remark : job.remarks) spdlog::warn("{}: {}", name, remark);
+    std::string page;
     if (!result.frames.empty()) {
-      directory.add("report", fmt::format("report-{}.html", i + 1).c_str(),
+      page = fmt::format("report-{}.html", i + 1);
+      directory.add(fmt::format("report_{}", i + 1).c_str(), page.c_str(),
                     calibration_report({name, job.input, job.options, result, job.remarks,
                                         ALIDADE_VERSION, now, job.untracked}));
     }
     if (!result.ok()) {
       spdlog::warn("{}: left out: {}: {}", name, to_string(result.status), result.message);
+      dwells.push_back(
+          {*job.zoom, {}, page, fmt::format("{}: {}", to_string(result.status), result.message)});
       continue;
     }
     result.calibration.zoom = job.zoom;
+    dwells.push_back({*job.zoom, result.calibration, page, {}});
     calibration_of[i] = calibrations.size();
     calibrations.push_back(result.calibration);
     if (calibrations.size() == 1) fit_options = zoom_fit_options(job.options);
@@ -197,14 +208,16 @@ int calibrate_zooms(const CalibrateOptions& options, std::vector<CalibrationJob>
                                                 calibrations.size(), jobs.size(), error));
   }
   for (CalibrationJob& job : jobs) track_movement(&job, signals);
+  std::vector<ZoomReportMovement> told;
   const std::vector<MovementObservation> movements =
-      observe_movements(jobs, calibration_of, calibrations, fit.curve);
+      observe_movements(jobs, calibration_of, calibrations, fit.curve, &told);
   if (!movements.empty()) {
     ZoomFit with_movements;
     if (fit_zoom(calibrations, movements, fit_options, &with_movements, &error)) {
       fit = with_movements;
     } else {
       spdlog::warn("movements of the zoom are left out: {}", error);
+      for (ZoomReportMovement& each : told) each.refusal = error;
     }
   }
   for (const std::string& line : zoom_advice(fit.curve)) spdlog::warn("{}", line);
@@ -215,6 +228,9 @@ int calibrate_zooms(const CalibrateOptions& options, std::vector<CalibrationJob>
   if (!fit.curve.at(fit.curve.first_reading(), &first)) {
     throw CommandError(kExitFailed, "the zoom curve has no calibration at its first reading");
   }
+  directory.add("report", "report.html",
+                zoom_report({jobs.front().recording, fit, std::move(dwells), std::move(told),
+                             ALIDADE_VERSION, now}));
   directory.add("calibration", "calibration.yaml", [&](const std::string& path, std::string* why) {
     CalibrationNotes notes;
     notes.zoom_curve = fit.curve;

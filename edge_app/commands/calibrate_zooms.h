@@ -12,7 +12,7 @@
 
 namespace alidade {
 
-// Writes calibration.yaml with the curve, and a report for each dwell. A dwell that cannot be
+// Writes calibration.yaml with the curve, its report, and a report for each dwell. A dwell that cannot be
 // calibrated is left out with a warning. Returns the exit code; throws CommandError.
 [[nodiscard]] int calibrate_zooms(const CalibrateOptions& options, std::vector<CalibrationJob> jobs,
                                   StopSignals* signals);

@@ -11,6 +11,7 @@
 
 #include "core/calibration/zoom_stretches.h"
 #include "core/model/median.h"
+#include "core/model/recording_needs.h"
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/video_tracks.h"
 #include "edge_app/config/noise_file.h"
@@ -196,12 +197,12 @@ std::vector<CalibrationJob> load_calibration_jobs(const std::string& directory,
     return {job};
   }
   std::vector<ZoomStretch> stretches = find_zoom_stretches(
-      readings, {jitter.tolerance, ZoomStretchOptions().glitch_s, kLeastStretch_s});
+      readings, {jitter.tolerance, ZoomStretchOptions().glitch_s, kZoomRestLeast_s});
   require(
       !stretches.empty(),
-      fmt::format("{}: the zoom reading never stands still for {:g} s; dwell at each zoom for "
-                  "10 s and more while the camera pans and tilts{}",
-                  directory, kLeastStretch_s,
+      fmt::format("{}: the zoom reading never stands still for {:g} s; dwell at each of {} zooms "
+                  "or more for {:g} s and more while the camera pans and tilts{}",
+                  directory, kZoomRestLeast_s, kZoomsAsked, kCalibrationAsked_s,
                   zoom_tolerance ? "" : ", or give --zoom-tolerance to a reading that flickers"));
   if (jitter.sigma > 0) set_levels(readings, &stretches);
   if (stretches.size() == 1) {

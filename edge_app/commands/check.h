@@ -3,11 +3,13 @@
 
 #include <string>
 
+#include "core/model/recording_needs.h"
+
 namespace alidade {
 
 struct CheckOptions {
-  std::string config;      // path of alidade.yaml
-  double duration_s = 10;  // from the first item of each link on
+  std::string config;                 // path of alidade.yaml
+  double duration_s = kCheckAsked_s;  // from the first item of each link on
   bool json = false;
 };
 

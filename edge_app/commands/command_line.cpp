@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "core/model/recording_needs.h"
 #include "edge_app/commands/calibrate.h"
 #include "edge_app/commands/calibrate_shutter.h"
 #include "edge_app/commands/check.h"
@@ -197,10 +198,10 @@ void add_verify(CLI::App& app, int* exit_code) {
   add_zoom_tolerance(command, &options->zoom_tolerance);
   command->add_flag("--json", options->json, "The result on stdout as one line of JSON");
   command->footer(
-      "Exit status: 0 the sigmas hold, 1 they are contradicted, 2 nothing could be judged. Record "
-      "for a minute while the head pans and tilts over a few fields of view, to and fro, at "
-      "several "
-      "speeds.");
+      fmt::format("Exit status: 0 the sigmas hold, 1 they are contradicted, 2 nothing could be "
+                  "judged. Record for {:g} s while the head pans and tilts over {:g} field of view "
+                  "or more, to and fro, at several speeds.",
+                  kVerificationAsked_s, kVerificationRangeAsked));
   command->callback([options, exit_code] { *exit_code = verify_calibration(*options); });
 }
 

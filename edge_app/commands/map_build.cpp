@@ -13,6 +13,7 @@
 
 #include "core/mapping/keyframe_choice.h"
 #include "core/mapping/map_building.h"
+#include "core/model/recording_needs.h"
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/map_recording.h"
 #include "edge_app/commands/map_report.h"
@@ -58,11 +59,14 @@ struct Pace {
   std::size_t frames = 0;  // frames whose speed telemetry gives
   std::size_t fast = 0;    // of these, the ones that are too fast
   double longest_f = 0;    // px, the longest focal length of them
-  [[nodiscard]] double most_haste() const { return is_known ? kMostKnownHaste : 1; }
+  [[nodiscard]] double most_motion_px() const {
+    return is_known ? kSlowMotionCalibrated_px : kSlowMotion_px;
+  }
+  [[nodiscard]] double most_haste() const { return most_motion_px() / kSlowMotion_px; }
 
   // For the person who turns the camera.
   [[nodiscard]] std::string text() const {
-    const double most_px = KeyframeChoiceOptions().most_motion_px * most_haste();
+    const double most_px = most_motion_px();
     std::string out = fmt::format("so slowly that a picture moves by at most {:g} px", most_px);
     if (longest_f == 0) return out + " while it is read out";
     out += fmt::format(
@@ -73,14 +77,10 @@ struct Pace {
       out += fmt::format(
           " (that read-out time is a guess; with a calibration of `alidade calibrate` beside the "
           "first recording, or by --calibration, {:g} px are allowed)",
-          KeyframeChoiceOptions().most_motion_px * kMostKnownHaste);
+          kSlowMotionCalibrated_px);
     }
     return out;
   }
-
- private:
-  // If the motion of each row is known, only blur limits the speed.
-  static constexpr double kMostKnownHaste = 5;
 };
 
 // The read-out time if nothing states it.
@@ -226,8 +226,10 @@ std::string fast_text(const Pace& pace) {
           kExitFailed,
           fmt::format(
               "{}: {} unconnected parts, with pictures {}{}; add recordings that pass from one "
-              "part to the other, at zooms between, {}; or take the largest with --largest-part",
-              what, build.groups.size(), parts, fast_text(pace), pace.text()));
+              "part to the other, at zooms between, {}, neighbouring views overlapping by {:g} % "
+              "or more; or take the largest with --largest-part",
+              what, build.groups.size(), parts, fast_text(pace), pace.text(),
+              100 * kMapOverlapAsked));
     }
     case MapBuildStatus::kNoTexture:
       throw CommandError(kExitFailed,

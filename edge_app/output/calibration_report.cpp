@@ -45,6 +45,7 @@ void verdict(ReportPage& page) {
   fact(fmt::format("{:.3f}", q.telemetry_sigma_ratio), "telemetry residuals / assumed noise");
   fact(fmt::format("{}", page.result().trajectory.segments() + 1), "spline knots");
   page.add("</ul>\n");
+  verdicts(page);
   list(page, "What contradicts the model", q.describe_departures());
   list(page, "What would help", q.advice);
   std::vector<std::string> left_out = unused_frames(page);

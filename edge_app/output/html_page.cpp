@@ -26,6 +26,10 @@ p { margin: 6px 0; } .soft { color: var(--soft); }
   margin: 16px 0; padding: 0; list-style: none; }
 .facts li { background: var(--panel); border-radius: 6px; padding: 8px 12px; color: var(--soft);
   font-size: 13px; } .facts b { display: block; color: var(--ink); font-size: 19px; font-weight: 600; }
+.verdicts { margin: 0; padding: 0; list-style: none; }
+.verdicts li { border-left: 4px solid var(--good); padding: 3px 12px; margin: 6px 0; }
+.verdicts .grown { border-color: var(--b); } .verdicts .weak { border-color: var(--bad); }
+td.words { white-space: normal; } a { color: var(--a); }
 .scroll { overflow-x: auto; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: 14px; }
 th { text-align: left; color: var(--soft); font-weight: 600; }

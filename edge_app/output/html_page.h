@@ -7,7 +7,8 @@
 
 namespace alidade {
 
-// title and body are HTML. Classes for the body: verdict (weak), facts, scroll, pair, plot, key,
+// title and body are HTML. Classes for the body: verdict (weak), verdicts (with
+// items good, grown, weak), facts, words, scroll, pair, plot, key,
 // soft, and those of SvgPlot.
 [[nodiscard]] std::string html_page(const std::string& title, const std::string& body);
 

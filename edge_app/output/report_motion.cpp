@@ -76,6 +76,60 @@ void trajectory(ReportPage& page) {
   }
 }
 
+namespace {
+
+// By how much a polled sample's angle is late or early, by the motion: e r / r^2 with the error e
+// and the rate r of both axes. Only where that is known to `most_s` or better.
+struct PolledDelay {
+  double time_s = 0;  // since the first frame
+  double late_s = 0;
+};
+
+std::vector<PolledDelay> polled_delays(const ReportPage& page, double most_s) {
+  std::vector<PolledDelay> delays;
+  for (const TelemetryResidual& residual : page.result().telemetry_residuals) {
+    if (residual.outlier || !residual.error_rad.allFinite() || !residual.sigma_rad.allFinite())
+      continue;
+    const Vector2<double> rate = page.result().trajectory.rate(residual.time_s).vector();
+    const double square = rate.squaredNorm();
+    const double sigma_rad = residual.sigma_rad.maxCoeff();
+    if (!(square > 0) || sigma_rad / std::sqrt(square) > most_s) continue;
+    delays.push_back({residual.time_s - page.start_s(), residual.error_rad.dot(rate) / square});
+  }
+  return delays;
+}
+
+// Of a telemetry whose samples have times of their own. There is no line to hold them against, but
+// the motion shows when each angle was true.
+void polled_stamps(ReportPage& page) {
+  constexpr double kSharpest_s = 1e-3;
+  const double sigma_s = page.report().input.noise.telemetry_stamp_sigma_s.value_or(kSharpest_s);
+  const std::vector<PolledDelay> delays = polled_delays(page, std::max(kSharpest_s, sigma_s));
+  double range = 3 * kMilli * sigma_s;
+  std::vector<PlotPoint> points;
+  for (const PolledDelay& one : delays) {
+    points.push_back({one.time_s, kMilli * one.late_s});
+    range = std::max(range, 1.05 * std::abs(points.back().y));
+  }
+  SvgPlot plot(kHalf_px, 240, page.time_axis(), {-range, range, "angle - stamp, ms"});
+  plot.band(-2 * kMilli * sigma_s, 2 * kMilli * sigma_s);
+  plot.level(0);
+  plot.dots(points, "b", 3);
+  page.figure(fmt::format("<b>Stamps of the telemetry</b> \u2013 it is polled; how much later than "
+                          "its stamp each angle was true, as the motion tells; {} of {} samples "
+                          "are quick enough for that; grey: \u00b12 sigma of a poll",
+                          delays.size(), page.result().telemetry_residuals.size()),
+              plot, "timing residuals of the polled telemetry");
+}
+
+const char* taken_as(const StreamTiming& timing, StampNoise noise) {
+  if (noise == StampNoise::kOwnTimes) return "their own times: polled";
+  if (!timing.steady) return "they are: no steady clock";
+  return noise == StampNoise::kSymmetric ? "scattering to both sides" : "late only";
+}
+
+}  // namespace
+
 void timing(ReportPage& page) {
   page.add(
       "<h2>Clocks</h2>\n<div class=\"scroll\"><table>\n<thead><tr><th>stream</th><th>period, ms"
@@ -87,9 +141,7 @@ void timing(ReportPage& page) {
         "<td>{}</td></tr>\n",
         name, kMilli * timing.period_s, kMilli * timing.period_sigma_s,
         kMilli * timing.stamp_sigma_s, kMilli * timing.offset_sigma_s, timing.lost,
-        !timing.steady                    ? "they are: no steady clock"
-        : noise == StampNoise::kSymmetric ? "scattering to both sides"
-                                          : "late only");
+        taken_as(timing, noise));
   };
   row("image", page.result().image_timing, page.report().options.image_stamps);
   row("telemetry", page.result().telemetry_timing, page.report().options.telemetry_stamps);
@@ -103,16 +155,6 @@ void timing(ReportPage& page) {
   for (const FrameResult& frame : page.result().frames) {
     image.push_back(
         {frame.time_s - page.start_s(), kMilli * (stamp_of[frame.frame] - frame.time_s)});
-  }
-  std::vector<PlotPoint> telemetry;
-  std::optional<std::size_t> shown;
-  for (const TelemetryResidual& residual : page.result().telemetry_residuals) {
-    // A second residual of the same sample is a change of a coarse reading, not a time stamp.
-    if (shown == residual.sample) continue;
-    shown = residual.sample;
-    const double line = residual.time_s + page.result().calibration.clock_offset;
-    telemetry.push_back({residual.time_s - page.start_s(),
-                         kMilli * (page.report().input.telemetry[residual.sample].stamp_s - line)});
   }
   const auto plot_stream = [&](const char* name, const char* colour,
                                const std::vector<PlotPoint>& points, const StreamTiming& timing) {
@@ -134,6 +176,21 @@ void timing(ReportPage& page) {
                 plot, std::string("timing residuals of ") + name);
   };
   plot_stream("the image", "a", image, page.result().image_timing);
+  if (page.report().options.telemetry_stamps == StampNoise::kOwnTimes) {
+    polled_stamps(page);
+    page.add("</div>\n");
+    return;
+  }
+  std::vector<PlotPoint> telemetry;
+  std::optional<std::size_t> shown;
+  for (const TelemetryResidual& residual : page.result().telemetry_residuals) {
+    // A second residual of the same sample is a change of a coarse reading, not a time stamp.
+    if (shown == residual.sample) continue;
+    shown = residual.sample;
+    const double line = residual.time_s + page.result().calibration.clock_offset;
+    telemetry.push_back({residual.time_s - page.start_s(),
+                         kMilli * (page.report().input.telemetry[residual.sample].stamp_s - line)});
+  }
   plot_stream("the telemetry", "b", telemetry, page.result().telemetry_timing);
   page.add("</div>\n");
 }

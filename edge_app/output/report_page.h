@@ -81,6 +81,8 @@ class ReportPage {
 
 // How many frames were not used, a line for each reason. In report_frames.cpp.
 std::vector<std::string> unused_frames(const ReportPage& page);
+// What the numbers say, in words, each with its limit. In report_verdicts.cpp.
+void verdicts(ReportPage& page);
 // In report_residuals.cpp.
 void residuals(ReportPage& page);
 // In report_motion.cpp.

@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 
+#include "core/model/recording_needs.h"
 #include "core/realtime/image/fast_corners.h"
 #include "core/realtime/image/patch_alignment.h"
 #include "core/realtime/image/pyramid.h"
@@ -16,7 +17,6 @@ namespace {
 constexpr std::size_t kPartners = 8;  // of a frame, at most
 constexpr std::size_t kPlaces = 24;   // looked for in a pair
 constexpr std::size_t kLeastPlaces = 6;
-constexpr double kLeastOverlap = 0.3;  // of the picture's width and height
 constexpr double kBorder_px = 14;
 constexpr std::uint8_t kCornerThreshold = 12;  // grey levels
 constexpr double kMinContrast = 3;             // grey levels / px
@@ -197,8 +197,8 @@ bool overlap(const SeenFrame& first, const SeenFrame& second) {
   const auto seen = transfer(best_of(first), best_of(second), middle);
   if (!seen) return false;
   const Vector2<double> shift = (*seen - middle).cwiseAbs();
-  return shift.x() < (1 - kLeastOverlap) * image.width &&
-         shift.y() < (1 - kLeastOverlap) * image.height;
+  return shift.x() < (1 - kReturnOverlapLeast) * image.width &&
+         shift.y() < (1 - kReturnOverlapLeast) * image.height;
 }
 
 }  // namespace
@@ -211,7 +211,7 @@ std::vector<PlacePair> match_places(const std::vector<SeenFrame>& frames) {
   for (std::size_t i = 0; i < frames.size(); ++i) {
     std::vector<std::size_t> partners;
     for (std::size_t j = i + 1; j < frames.size(); ++j) {
-      if (frames[j].time_s - frames[i].time_s >= kLeastGap_s && overlap(frames[i], frames[j]))
+      if (frames[j].time_s - frames[i].time_s >= kReturnGapLeast_s && overlap(frames[i], frames[j]))
         partners.push_back(j);
     }
     const std::size_t wanted = std::min(kPartners, partners.size());

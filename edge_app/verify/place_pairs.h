@@ -2,7 +2,7 @@
 // Places that two pictures of a recording both show. Corners of the first picture (FAST) are
 // searched for in the second by patch alignment, around the places that the orientations of both
 // give. The corners are chosen anew: they are not the landmarks that OE mode used. The pictures lie
-// at least kLeastGap_s apart, so that neighbours do not count as returns. Pixels as in
+// at least kReturnGapLeast_s apart, so that neighbours do not count as returns. Pixels as in
 // CONVENTIONS.md. Pure; allocates.
 
 #include <vector>
@@ -11,8 +11,6 @@
 #include "edge_app/verify/seen_frame.h"
 
 namespace alidade {
-
-inline constexpr double kLeastGap_s = 1;
 
 struct PlaceMatch {
   Vector2<double> first;       // px, where it is in the first picture

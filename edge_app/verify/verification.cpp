@@ -8,6 +8,7 @@
 
 #include "core/model/angle.h"
 #include "core/model/median.h"
+#include "core/model/recording_needs.h"
 #include "edge_app/verify/verification_words.h"
 
 namespace alidade {
@@ -145,21 +146,27 @@ Extent extent_of(const std::vector<SeenFrame>& frames) {
 std::vector<std::string> advice_for(const VerifyInput& input, const Verification& verification) {
   std::vector<std::string> out;
   if (input.frames.size() < 2) {
-    out.emplace_back("record for 30 s at least, with pictures and telemetry, while the head turns");
+    out.push_back(
+        fmt::format("record for {:g} s at least, with pictures and telemetry, while the head turns",
+                    kVerificationLeast_s));
     return out;
   }
   const Extent extent = extent_of(input.frames);
   const Camera<double>& camera = input.frames.front().by_telemetry.calibration.camera;
   const double width = camera.width / camera.focal_length;
   const double height = camera.height / camera.focal_length;
-  if (extent.pan < width / 2)
-    out.push_back(fmt::format("pan over {:.2g} degrees or more and back", width * kDegrees));
-  if (extent.tilt < height / 2)
-    out.push_back(fmt::format("tilt over {:.2g} degrees or more and back", height * kDegrees));
-  if (extent.reversals < 4)
-    out.emplace_back("turn back several times, so that places are passed from both sides");
-  if (verification.pairs < kLeastPairs && out.empty())
-    out.emplace_back("record longer, over a scene with more texture");
+  if (extent.pan < kVerificationRangeLeast * width)
+    out.push_back(fmt::format("pan over {:.2g} degrees or more and back",
+                              kVerificationRangeAsked * width * kDegrees));
+  if (extent.tilt < kVerificationRangeLeast * height)
+    out.push_back(fmt::format("tilt over {:.2g} degrees or more and back",
+                              kVerificationRangeAsked * height * kDegrees));
+  if (extent.reversals < kReversalsLeast)
+    out.push_back(fmt::format(
+        "turn back {} times or more, so that places are passed from both sides", kReversalsLeast));
+  if (verification.pairs < kReturnsLeast && out.empty())
+    out.push_back(fmt::format("record longer, {:g} s or more, over a scene with more texture",
+                              kVerificationAsked_s));
   return out;
 }
 
@@ -234,7 +241,7 @@ Verification verify(const VerifyInput& input) {
             pair_means(of_kind(comparison.kind, frames, all), noise_factor), frames, from,
             from == OrientationFrom::kTelemetry ? motion_inflation(input, from) : 1);
         const ClaimResult& result = comparison.result;
-        if (result.pairs >= kLeastPairs && result.freedom >= kLeastFreedom) {
+        if (result.pairs >= kReturnsLeast && result.freedom >= kLeastFreedom) {
           comparison.verdict =
               result.log_chance < log_limit ? Verdict::kContradicted : Verdict::kHolds;
         }
@@ -243,7 +250,7 @@ Verification verify(const VerifyInput& input) {
       }
     }
   }
-  const bool is_enough = out.pairs >= kLeastPairs;
+  const bool is_enough = out.pairs >= kReturnsLeast;
   if (is_enough) out.verdict = Verdict::kHolds;
   for (ModelComparison& comparison : out.model) {
     if (!is_enough) comparison.verdict = Verdict::kNotJudged;

@@ -22,7 +22,7 @@ namespace alidade {
 enum class Verdict {
   kHolds,         // no comparison contradicts the sigmas
   kContradicted,  // a comparison does, beyond chance
-  // Of claims: fewer than kLeastPairs pairs or kLeastFreedom independent numbers. Of a departure:
+  // Of claims: fewer than kReturnsLeast pairs or kLeastFreedom independent numbers. Of a departure:
   // fewer pairs, nothing of it to be seen, or a test that would show only twenty times the claimed
   // sigma. Of known directions: too few for the turn, or less than kLeastShare.
   kNotJudged
@@ -83,14 +83,13 @@ struct Verification {
   std::vector<ClaimComparison> claims;  // each kind for landmarks, then for telemetry; may be empty
   std::vector<ModelComparison> model;   // each departure; empty as claims: there are no pairs
   std::vector<KnownComparison> known;   // landmarks, then telemetry; empty: nothing is known
-  std::vector<DepartureTest> found;     // see ModelCheckResult; empty if pairs < kLeastPairs
+  std::vector<DepartureTest> found;     // see ModelCheckResult; empty if pairs < kReturnsLeast
   // For plots: one entry for each pair that could be compared.
   std::vector<PairRows> by_landmarks, by_telemetry, by_all_samples;
 };
 
-// A comparison with fewer independent numbers, or fewer pairs, is not judged.
+// A comparison with fewer independent numbers, or fewer than kReturnsLeast pairs, is not judged.
 inline constexpr double kLeastFreedom = 12;
-inline constexpr int kLeastPairs = 20;
 // Known directions are not judged if less of their covariance is claimed by frames and calibration.
 inline constexpr double kLeastShare = 0.1;
 

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "core/model/angle.h"
+#include "core/model/recording_needs.h"
 
 namespace alidade {
 namespace {
@@ -198,7 +199,7 @@ std::string sentence_of(const ClaimComparison& comparison) {
     return fmt::format(
         "{}: not judged; {} pairs, worth {:.0f} independent numbers ({} and {:.0f} "
         "are needed)",
-        where, r.pairs, r.freedom, kLeastPairs, kLeastFreedom);
+        where, r.pairs, r.freedom, kReturnsLeast, kLeastFreedom);
   }
   return fmt::format(
       "{}: directions of the same place differ by {:.2f} times what sigma claims (95 %: {:.2f} to "
@@ -268,7 +269,7 @@ std::string summary_of(const Verification& v) {
   switch (v.verdict) {
     case Verdict::kNotJudged:
       parts.push_back(fmt::format("{} pairs of pictures show the same places again ({} are needed)",
-                                  v.pairs, kLeastPairs));
+                                  v.pairs, kReturnsLeast));
       if (!v.known.empty()) parts.push_back(v.known.front().sentence);
       return "not judged: " + joined(parts);
     case Verdict::kHolds:

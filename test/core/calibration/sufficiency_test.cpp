@@ -64,12 +64,15 @@ const double kCorner = std::sqrt(960.0 * 960 + 540.0 * 540) / 2000;
 
 INSTANTIATE_TEST_SUITE_P(
     Sufficiency, JudgeAtItsLimits,
-    testing::Values(Limit{Parameter::kFocalLength, 0.05 * 2000, "focal length known to 5.0 %",
-                          false},
-                    Limit{Parameter::kClockOffset, 0.01, "clock offset known to 10.0 ms", true},
-                    Limit{Parameter::kLineDelay, 5e-3 / 1080, "read-out known to 5.0 ms", true},
+    testing::Values(Limit{Parameter::kFocalLength, 0.05 * 2000,
+                          "focal length known to 5.0 % only, 5 % are needed", false},
+                    Limit{Parameter::kClockOffset, 0.01,
+                          "clock offset known to 10.0 ms only, 10 ms are needed", true},
+                    Limit{Parameter::kLineDelay, 5e-3 / 1080,
+                          "read-out known to 5.0 ms only, 5 ms are needed", true},
                     Limit{Parameter::kRadialDistortion, 0.02 / (kCorner * kCorner),
-                          "radial distortion known to 2.0 %", false}),
+                          "radial distortion known to 2.0 % of the radius only, 2 % are needed",
+                          false}),
     [](const auto& limit) { return std::string(to_string(limit.param.parameter)); });
 
 TEST(Judge, NamesTheParametersThatAreUncertainTogether) {

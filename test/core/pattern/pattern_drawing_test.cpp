@@ -9,6 +9,7 @@ namespace alidade {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 KnownPattern pattern_of(const std::string& text) {
   std::string error;
@@ -45,6 +46,29 @@ TEST(PatternDrawing, DrawsInTrueSize) {
   EXPECT_EQ(count_of(*tags, square), 25);
   EXPECT_EQ(count_of(*draw_pattern(pattern_of("aprilgrid:6x6:25mm:0.3"), "a3", &error), square),
             49);
+}
+
+// What a person holds a ruler against, and what to do if the printer scaled the page.
+TEST(PatternDrawing, HasACaptionAndARuler) {
+  std::string error;
+  const std::string below = draw_pattern(pattern_of("chessboard:9x6:25mm"), "a4", &error).value();
+  EXPECT_THAT(below, HasSubstr("--pattern chessboard:9x6:25mm, 250 x 175 mm on a4<"));
+  EXPECT_THAT(below, HasSubstr("25mm is the side of a square."));
+  EXPECT_THAT(below, HasSubstr("M0 7h100\"")) << "100 mm";
+  EXPECT_EQ(count_of(below, "v-2.6") + count_of(below, "v-1.8") + count_of(below, "v-0.9"), 101);
+  // The board makes room: 5 mm of margin, 16 of caption, 14 mm of white.
+  EXPECT_THAT(below, HasSubstr("<g transform=\"translate(23.500 9.500)\""));
+  EXPECT_THAT(below, HasSubstr("<g transform=\"translate(10.000 189.000)\">"));
+  const std::string beside = draw_pattern(pattern_of("chessboard:9x6:27mm"), "a4", &error).value();
+  EXPECT_THAT(beside, HasSubstr("rotate(-90)"));
+  const std::string full = draw_pattern(pattern_of("chessboard:9x6:28mm"), "a4", &error).value();
+  EXPECT_THAT(full, Not(HasSubstr("<text")));
+  // As it is read, whatever it is.
+  for (const char* name : {"circles:4x11:15mm", "symmetric-circles:7x6:20mm",
+                           "aprilgrid:4x4:25mm:0.25", "chessboard:5x4:12.5mm"}) {
+    EXPECT_THAT(draw_pattern(pattern_of(name), "a3", &error).value(),
+                HasSubstr("--pattern " + std::string(name) + ", "));
+  }
 }
 
 TEST(PatternDrawing, SaysWhatDoesNotFit) {

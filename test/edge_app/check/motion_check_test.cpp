@@ -15,6 +15,7 @@
 namespace alidade {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -210,7 +211,9 @@ TEST(MotionCheck, AsksToMoveACameraAtRest) {
   const MotionReport report = Scene([](double) { return Vector2<double>(0.3, 0.1); }).check();
   EXPECT_EQ(report.pan, AxisVerdict::kNotMoved);
   EXPECT_THAT(report.findings, IsEmpty());
-  EXPECT_THAT(describe(report).front().second, HasSubstr("turn it during the check"));
+  EXPECT_THAT(describe(report).front().second,
+              AllOf(HasSubstr("for 2.4 s or more during the check"),
+                    HasSubstr("by 2 px or more in 0.3 s")));
 }
 
 TEST(MotionCheck, NoticesAHeadThatReportsOneAngleForEver) {

@@ -152,6 +152,11 @@ TEST_F(CalibrateZooms, ManyRecordingsBecomeOneCurve) {
   EXPECT_EQ(json["zooms"].size(), 3U);
   EXPECT_EQ(json["zooms"][2]["zoom"], 2.5);
   EXPECT_TRUE(fs::exists(output() + "/report-3.html"));
+  std::string report;
+  std::string error;
+  ASSERT_TRUE(read_file(json["files"]["report"].get<std::string>(), &report, &error)) << error;
+  EXPECT_THAT(report, HasSubstr("from 3 dwells and 0 movements"));
+  EXPECT_THAT(report, HasSubstr("report-3.html"));
   // The calibration of one zoom, as every command reads it.
   EXPECT_EQ(run({ALIDADE_EXECUTABLE, "replay", folders_["a"].path(), "--calibration",
                  output() + "/calibration.yaml"})

@@ -65,6 +65,52 @@ TEST(CalibrationReport, SaysWhatMadeItWhenAndOfWhichPictures) {
   EXPECT_THAT(page, Not(HasSubstr("class=\"gap\"")));
 }
 
+TEST(CalibrationReport, SaysInWordsWhatEachNumberMeansAndItsLimit) {
+  Calibrated run{test::Simulation()};
+  CalibrationQuality& quality = run.result.quality;
+  quality.pixel_sigma_ratio = 1;
+  quality.repetition = 1;
+  const std::string good = run.report();
+  EXPECT_THAT(good, HasSubstr("image errors are as the tracks state"));
+  EXPECT_THAT(good, HasSubstr("image errors do not repeat"));
+  EXPECT_THAT(good, HasSubstr("(limit 5 %)</span>"));
+  EXPECT_THAT(good, HasSubstr("(limit 10 ms)</span>"));
+  EXPECT_EQ(count(good, "<li class=\"weak\""), 0U);
+  quality.pixel_sigma_ratio = 1.76;
+  quality.repetition = 2;
+  const std::string grown = run.report();
+  EXPECT_THAT(grown, HasSubstr("image residuals / noise 1.76"));
+  EXPECT_THAT(grown, HasSubstr("live, more than 4 is refused"));
+  EXPECT_THAT(grown, HasSubstr("2.0 observations of a landmark count as one; sigmas grown by 1.4"));
+  quality.pixel_sigma_ratio = 4.5;
+  const int d = index(Parameter::kClockOffset);
+  run.result.calibration.covariance(d, d) = 0.02 * 0.02;
+  const std::string weak = run.report();
+  EXPECT_THAT(weak, HasSubstr("<li class=\"weak\"><b>image residuals / noise 4.50"));
+  EXPECT_THAT(weak, HasSubstr("<li class=\"weak\"><b>clock offset known to 20 ms"));
+}
+
+// Polled telemetry has no steady clock to hold stamps against; the motion tells when an angle was true.
+TEST(CalibrationReport, ShowsByTheMotionHowLatePolledAnglesAre) {
+  Calibrated run{test::Simulation()};
+  run.options.telemetry_stamps = StampNoise::kOwnTimes;
+  run.input.noise.telemetry_stamp_sigma_s = 0.01;
+  // Each angle as it was 5 ms later than its stamp.
+  for (TelemetryResidual& residual : run.result.telemetry_residuals)
+    residual.error_rad = 0.005 * run.result.trajectory.rate(residual.time_s).vector();
+  const std::string page = run.report();
+  EXPECT_THAT(page, HasSubstr("<td>their own times: polled</td>"));
+  const std::string figure = page.substr(page.find("<b>Stamps of the telemetry</b>"));
+  EXPECT_THAT(figure, HasSubstr("angle - stamp, ms"));
+  // All at one height: of the 186 px of the plot, that of 5 ms within +-30 ms.
+  const std::string dots = figure.substr(figure.find("<path class=\"dots b\""));
+  const std::string path = dots.substr(0, dots.find("/>"));
+  const double height = 10 + 186 * (30.0 - 5) / 60;
+  const std::string level = fmt::format(" {}h0", std::round(2 * height) / 2);
+  EXPECT_GT(count(path, "h0"), 20U);
+  EXPECT_EQ(count(path, level), count(path, "h0")) << level;
+}
+
 // Two seconds without a point, and one frame whose only point is an outlier.
 TEST(CalibrationReport, ShowsAndExplainsFramesThatWereNotUsed) {
   Calibrated run{test::Simulation()};
