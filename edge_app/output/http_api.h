@@ -31,6 +31,8 @@ struct HttpApiSources {
   std::function<std::shared_ptr<const ZoomCurve>()> zoom_curve;
   // The errors by which the telemetry is corrected; may return null, and may be an empty function.
   std::function<std::shared_ptr<const TelemetryError>()> telemetry_error;
+  // How far a first or fresh calibration is; may return null, and may be an empty function.
+  std::function<std::shared_ptr<const CalibrationProgress>()> calibration_progress;
   std::shared_ptr<const PlaneEstimate> plane;  // null: none is configured
   // Of directions of things at a known distance; the nearness of the scene that is in view.
   Pupil pupil;
