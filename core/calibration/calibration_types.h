@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "core/calibration/calibration_goals.h"
 #include "core/calibration/trajectory_spline.h"
 #include "core/model/calibration.h"
 #include "core/model/pupil.h"
@@ -235,8 +236,6 @@ struct CalibrationQuality {
   // the largest one in words.
   double condition = 0;
   std::string weakest_direction;
-  // Clock offset or read-out time is too uncertain. Changes of speed would help.
-  bool weak_in_time = false;
   std::vector<std::string> advice;  // what motion or knowledge would help; also with kOk
   std::optional<CalibrationContradiction> contradiction;  // the worst
   std::vector<CalibrationCause> causes;                   // the likeliest first
@@ -263,7 +262,8 @@ struct CalibrationResult {
   std::vector<TelemetryResidual> telemetry_residuals;
   CalibrationExclusions exclusions;
   CalibrationQuality quality;
-  std::optional<Nearness> nearness;  // of what is in view; empty: no scene was stated
+  std::optional<ParameterGoals> goals;  // what was judged; empty: it did not come so far
+  std::optional<Nearness> nearness;     // of what is in view; empty: no scene was stated
 
   // px, of things so far away that the pupil's place does not matter. Empty: no scene was stated.
   [[nodiscard]] std::optional<CalibrationPrior> far_focal_length() const;

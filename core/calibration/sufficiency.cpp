@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdio>
 
+#include "core/calibration/calibration_goals.h"
 #include "core/calibration/correlation.h"
 #include "core/calibration/number_text.h"
 #include "core/model/recording_needs.h"
@@ -31,11 +32,11 @@ const char* axis_name(int axis) { return axis == 0 ? "pan" : "tilt"; }
 // Begins with the axis's name. f: focal length, px.
 std::string moved_little(int axis, double range, double f, int width) {
   constexpr double kDegrees = 180 / kPi;
-  const double good = kGoodTravelShare * width;
+  const double asked = travel_limits(f, width).asked;
   return axis_name(axis) +
          text(" moves the image by %.0f px (%.2g deg) only", range * f, kDegrees * range) +
          text(": both axes have to move, by a good part of the image (%.0f px, %.2g deg) or more",
-              good, kDegrees * good / f);
+              asked * f, kDegrees * asked);
 }
 
 std::string reversed_text(const ReversedAxes& reversed) {
@@ -65,15 +66,15 @@ std::vector<double> times_beside(const std::vector<ImageMotion>& motion,
 // telemetry is noise), or that comes out far from where a head has it.
 CalibrationStatus check_axes(const Calibration& c, const MotionExtent& motion, std::string* why) {
   const double f = c.camera.focal_length;
+  const TravelLimits travel = travel_limits(f, c.camera.width);
   const Mechanics<double> nominal;
   for (int axis = 0; axis < 2; ++axis) {
-    const double range_px = motion.range[axis] * f;
     const Vector3<double>& found = axis == 0 ? c.mechanics.pan_axis : c.mechanics.tilt_axis;
     const Vector3<double>& expected = axis == 0 ? nominal.pan_axis : nominal.tilt_axis;
     const double turn = std::acos(std::clamp(found.dot(expected), -1.0, 1.0));
-    const bool is_there = range_px >= kMinTravelShare * c.camera.width;
+    const bool is_there = motion.range[axis] >= travel.least;
     if (is_there && turn <= kMaxAxisTurn) continue;
-    const bool is_little = range_px < kGoodTravelShare * c.camera.width;
+    const bool is_little = motion.range[axis] < travel.asked;
     *why = is_little ? moved_little(axis, motion.range[axis], f, c.camera.width)
                      : std::string(axis_name(axis)) + " does not turn the image as its angles say";
     if (turn > kMaxAxisTurn) {
@@ -107,6 +108,26 @@ void describe_weakest(CalibrationResult* result) {
     words += up ? " up" : " down";
   }
   result->quality.weakest_direction = words;
+}
+
+// How well a parameter is known, in the unit in which that is easily judged.
+std::string known_to(const ParameterGoal& goal, const Calibration& c, const MotionExtent& motion) {
+  switch (goal.parameter) {
+    case Parameter::kFocalLength:
+      return text("focal length known to %.1f %% only, %g %% are needed",
+                  100 * relative_focal_length_sigma(c), 100 * kMaxFocalLengthError);
+    case Parameter::kClockOffset:
+      return text("clock offset known to %.1f ms only, %g ms are needed (largest rate %.3f rad/s)",
+                  1e3 * *goal.sigma, 1e3 * kMaxClockOffsetError_s, motion.largest_rate.norm());
+    case Parameter::kLineDelay:
+      return text("read-out known to %.1f ms only, %g ms are needed",
+                  1e3 * *goal.sigma * c.camera.height, 1e3 * kMaxReadoutError_s);
+    case Parameter::kRadialDistortion:
+      return text("radial distortion known to %.1f %% of the radius only, %g %% are needed",
+                  100 * *goal.sigma / corner_unit(c.camera)[0], 100 * kMaxDistortionError);
+    default:
+      return std::string(to_string(goal.parameter)) + " is known too little";
+  }
 }
 
 }  // namespace
@@ -210,7 +231,7 @@ CalibrationStatus check_motion(const std::vector<ImageMotion>& motion,
     return CalibrationStatus::kTelemetryMismatch;
   }
   for (int axis = 0; axis < 2; ++axis) {
-    if (extent.range[axis] * in_px >= kMinTravelShare * input.width) continue;
+    if (extent.range[axis] >= travel_limits(in_px, input.width).least) continue;
     *why = moved_little(axis, extent.range[axis], in_px, input.width);
     return CalibrationStatus::kOneAxisOnly;
   }
@@ -226,7 +247,6 @@ void judge(const CalibrationOptions& options, const MotionExtent& motion,
   describe_weakest(result);
 
   std::vector<std::string> reasons;
-  const double f_error = relative_focal_length_sigma(c);
   const auto correlation = [&c](Parameter a, Parameter b) {
     const double scale = parameter_sigma(c, a) * parameter_sigma(c, b);
     return scale > 0 ? c.covariance(index(a), index(b)) / scale : 0.0;
@@ -240,35 +260,15 @@ void judge(const CalibrationOptions& options, const MotionExtent& motion,
         text("scales and focal length cannot be told apart in this field of view: relative to the "
              "telemetry's scale the focal length is known to %.2g, and that scale itself to %.2g; "
              "a whole turn or a wider field of view would separate them",
-             f_error, options.pan_scale.sigma));
+             relative_focal_length_sigma(c), options.pan_scale.sigma));
   }
-  if (f_error > kMaxFocalLengthError && !scale_from_prior) {
-    reasons.push_back(
-        text("focal length known to %.1f %% only, %g %% are needed: move farther on both axes",
-             100 * f_error, 100 * kMaxFocalLengthError));
-  }
-  const double d_error = parameter_sigma(c, Parameter::kClockOffset);
-  if (d_error > kMaxClockOffsetError_s) {
-    reasons.push_back(
-        text("clock offset known to %.1f ms only, %g ms are needed (largest rate %.3f rad/s): "
-             "change speed and direction more and faster",
-             1e3 * d_error, 1e3 * kMaxClockOffsetError_s, motion.largest_rate.norm()));
-  }
-  const double readout_error = parameter_sigma(c, Parameter::kLineDelay) * c.camera.height;
-  if (readout_error > kMaxReadoutError_s) {
-    reasons.push_back(
-        text("read-out known to %.1f ms only, %g ms are needed: move faster while the image is "
-             "read out",
-             1e3 * readout_error, 1e3 * kMaxReadoutError_s));
-  }
-  static_assert(kDistortionCount == 1, "each term is to be known well enough");
-  const double distortion_error =
-      parameter_sigma(c, Parameter::kRadialDistortion) / corner_unit(c.camera)[0];
-  if (distortion_error > kMaxDistortionError) {
-    reasons.push_back(
-        text("radial distortion known to %.1f %% of the radius only, %g %% are needed: let "
-             "landmarks cross the whole image",
-             100 * distortion_error, 100 * kMaxDistortionError));
+  ParameterGoals& goals = result->goals.emplace(calibration_goals(c.camera));
+  for (ParameterGoal& goal : goals) {
+    goal.sigma = parameter_sigma(c, goal.parameter);
+    goal.reached = *goal.sigma <= goal.wanted ||
+                   (goal.parameter == Parameter::kFocalLength && scale_from_prior);
+    if (goal.reached) continue;
+    reasons.push_back(known_to(goal, c, motion) + ": " + to_string(goal.helps));
   }
   for (const Parameter p :
        {Parameter::kPanAxis0, Parameter::kPanAxis1, Parameter::kTiltAxis0, Parameter::kTiltAxis1}) {
@@ -287,14 +287,14 @@ void judge(const CalibrationOptions& options, const MotionExtent& motion,
              "change of the lens",
              contradiction->scatter));
   }
-  result->quality.weak_in_time =
-      d_error > kMaxClockOffsetError_s || readout_error > kMaxReadoutError_s;
   if (reasons.empty()) {
     result->status = CalibrationStatus::kOk;
     result->message =
         "focal length " +
         estimate_text(c.camera.focal_length, parameter_sigma(c, Parameter::kFocalLength), "px") +
-        ", clock offset " + estimate_text(1e3 * c.clock_offset, 1e3 * d_error, "ms");
+        ", clock offset " +
+        estimate_text(1e3 * c.clock_offset, 1e3 * parameter_sigma(c, Parameter::kClockOffset),
+                      "ms");
     for (const std::string& line : result->quality.describe_departures()) {
       result->message += "; " + line;
     }

@@ -6,7 +6,7 @@
 //   judge          after the adjustment: an axis that did not move or lies where no head has it; a
 //                  parameter that is too uncertain; parts that contradict each other without a
 //                  known cause; advice on scales and axes that rest on their priors
-// The limits follow from the purpose: directions of pixels must be good enough. Allocates.
+// How well the parameters must be known: calibration_goals.h. Allocates.
 
 #include <string>
 #include <vector>
@@ -39,8 +39,8 @@ struct MotionExtent {
 [[nodiscard]] MotionExtent measure_motion(const TrajectorySpline& trajectory,
                                           const std::vector<double>& times_s);
 
-// After fill_result(). Sets status and message; unless an axis is refused, also condition,
-// weakest_direction and weak_in_time, and adds to advice. motion: of the result's trajectory.
+// After fill_result(). Sets status and message; unless an axis is refused, also goals, condition
+// and weakest_direction, and adds to advice. motion: of the result's trajectory.
 void judge(const CalibrationOptions& options, const MotionExtent& motion,
            CalibrationResult* result);
 

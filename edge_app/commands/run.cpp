@@ -181,6 +181,7 @@ int run_live(const RunOptions& options) {
   sources.summary = [&pipeline] { return pipeline.summary(); };
   sources.zoom_curve = [&pipeline] { return pipeline.zoom_curve(); };
   sources.telemetry_error = [&pipeline] { return pipeline.telemetry_error(); };
+  sources.calibration_progress = [&pipeline] { return pipeline.calibration_progress(); };
   sources.video_losses = [&video] { return video->counters(); };
   sources.ask_for_calibration = [self = calibrating.calibration.get()] {
     return self != nullptr && self->ask_for_fresh();

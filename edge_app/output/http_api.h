@@ -34,6 +34,8 @@ struct HttpApiSources {
   std::function<std::shared_ptr<const ZoomCurve>()> zoom_curve;
   // The errors by which the telemetry is corrected; may return null, and may be an empty function.
   std::function<std::shared_ptr<const TelemetryError>()> telemetry_error;
+  // How far a first or fresh calibration is; may return null, and may be an empty function.
+  std::function<std::shared_ptr<const CalibrationProgress>()> calibration_progress;
   std::shared_ptr<const PlaneEstimate> plane;  // null: none is configured
   // For directions of things at a distance (pixel_query.h): the lens's pupil, and scene_nearness()
   // of the scene from which the calibration is made; 0: no scene is configured.

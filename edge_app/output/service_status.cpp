@@ -53,6 +53,45 @@ Json detectors_json(const DetectorsReport& report) {
   return out;
 }
 
+Json coverage_json(const ViewCoverage& coverage) {
+  Json pan;
+  Json tilt;
+  if (const auto& range = coverage.range) {
+    pan = {range->least.pan, range->largest.pan};
+    tilt = {range->least.tilt, range->largest.tilt};
+  }
+  Json path = Json::array();
+  for (const PanTilt<double>& angle : coverage.path) path.push_back({angle.pan, angle.tilt});
+  return {{"columns", ViewCoverage::kColumns},
+          {"rows", ViewCoverage::kRows},
+          {"points", coverage.points},
+          {"pan_rad", std::move(pan)},
+          {"tilt_rad", std::move(tilt)},
+          {"path_rad", std::move(path)},
+          {"largest_rate_rad_s", coverage.largest_rate}};
+}
+
+Json progress_json(const HttpApiSources& sources) {
+  const auto progress = sources.calibration_progress ? sources.calibration_progress() : nullptr;
+  if (!progress) return nullptr;
+  Json parameters = Json::array();
+  for (const ParameterGoal& goal : progress->goals) {
+    parameters.push_back({{"name", to_string(goal.parameter)},
+                          {"unit", goal.unit},
+                          {"sigma", or_null(goal.sigma)},
+                          {"wanted", goal.wanted},
+                          {"reached", goal.reached},
+                          {"helps", to_string(goal.helps)}});
+  }
+  return {{"attempts", progress->attempts},
+          {"refusal", progress->refusal.empty() ? Json() : Json(progress->refusal)},
+          {"parameters", std::move(parameters)},
+          {"span_s", progress->span_s},
+          {"least_range_rad", progress->travel.least},
+          {"asked_range_rad", progress->travel.asked},
+          {"coverage", coverage_json(progress->coverage)}};
+}
+
 }  // namespace
 
 nlohmann::ordered_json service_status(const HttpApiSources& sources, const HttpCounters& http) {
@@ -79,7 +118,8 @@ nlohmann::ordered_json service_status(const HttpApiSources& sources, const HttpC
       {"calibrated", newest && newest->calibrated},
       {"activity", of_newest([](const Record& r) { return to_string(r.calibration.activity); })},
       {"needs", of_newest([](const Record& r) { return or_null(need_of(r)); })},
-      {"age_s", since_s ? Json(now_s - *since_s) : Json()}};
+      {"age_s", since_s ? Json(now_s - *since_s) : Json()},
+      {"progress", progress_json(sources)}};
   out["frames"] = {{"received", summary.frames},
                    {"records", summary.records},
                    {"oe", summary.with_landmarks},

@@ -267,6 +267,7 @@ void Pipeline::calibrate() {
   if (!warning.empty()) spdlog::warn("calibration thread: {}", warning);
   std::vector<std::shared_ptr<const PublishedCalibration>> lent;
   CalibrationReport said;
+  double told_s = 0;
   while (!stage_.output_ended()) {
     stage_.wait_feed();
     feed_calibration();
@@ -289,6 +290,11 @@ void Pipeline::calibrate() {
     if (due) return_freed_memory();
     report = calibration_->report();
     stage_.report(report);
+    constexpr double kTellPeriod_s = 0.5;
+    if (const double now_s = monotonic_now_s(); due || now_s >= told_s + kTellPeriod_s) {
+      tell_progress();
+      told_s = now_s;
+    }
     for (const std::string& line : calibration_->take_messages())
       spdlog::info("calibration: {}", line);
     if (report.activity != said.activity || report.need != said.need) {
@@ -298,6 +304,14 @@ void Pipeline::calibrate() {
       said = report;
     }
   }
+}
+
+void Pipeline::tell_progress() {
+  std::shared_ptr<const CalibrationProgress> news;
+  if (auto progress = calibration_->progress())
+    news = std::make_shared<const CalibrationProgress>(std::move(*progress));
+  const std::lock_guard<PriorityMutex> lock(summary_mutex_);
+  progress_.swap(news);
 }
 
 void Pipeline::write_output() {
@@ -347,6 +361,11 @@ std::shared_ptr<const ZoomCurve> Pipeline::zoom_curve() const {
 std::shared_ptr<const TelemetryError> Pipeline::telemetry_error() const {
   const std::lock_guard<PriorityMutex> lock(summary_mutex_);
   return telemetry_error_;
+}
+
+std::shared_ptr<const CalibrationProgress> Pipeline::calibration_progress() const {
+  const std::lock_guard<PriorityMutex> lock(summary_mutex_);
+  return progress_;
 }
 
 void Pipeline::count(const OutputMessage& message) {

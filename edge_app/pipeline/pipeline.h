@@ -13,7 +13,7 @@
 // A source that loses its connection is waited for. Records of mode `none` are made at the loss and
 // then each second. The pipeline is finished when the video has ended, a source has failed for
 // good, or the sink takes no more. stop() ends it at any time. One thread owns the pipeline and
-// calls everything here, except summary(), zoom_curve() and telemetry_error().
+// calls everything here, except summary(), zoom_curve(), telemetry_error() and calibration_progress().
 
 #include <atomic>
 #include <cstdint>
@@ -111,6 +111,9 @@ class Pipeline {
   [[nodiscard]] std::shared_ptr<const ZoomCurve> zoom_curve() const;
   // Likewise: what the telemetry is corrected by.
   [[nodiscard]] std::shared_ptr<const TelemetryError> telemetry_error() const;
+  // Likewise: how far a first or fresh calibration is; null: none is wanted. As of the last half
+  // second.
+  [[nodiscard]] std::shared_ptr<const CalibrationProgress> calibration_progress() const;
 
  private:
   void capture();
@@ -120,6 +123,7 @@ class Pipeline {
   [[nodiscard]] bool share_processor() const;
   void calibrate();
   void feed_calibration();
+  void tell_progress();
   void localize();
   void detect();
   void write_output();
@@ -151,6 +155,7 @@ class Pipeline {
   // Guarded by summary_mutex_.
   std::shared_ptr<const ZoomCurve> zoom_curve_;
   std::shared_ptr<const TelemetryError> telemetry_error_;
+  std::shared_ptr<const CalibrationProgress> progress_;
   PageFaults page_faults_;               // real-time thread, at its end
   PageFaults faults_at_start_;           // real-time thread, before it sets realtime_thread_
   std::atomic<int> realtime_thread_{0};  // its id; 0: not running

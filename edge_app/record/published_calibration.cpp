@@ -1,5 +1,7 @@
 #include "edge_app/record/published_calibration.h"
 
+#include "core/calibration/calibration_goals.h"
+
 namespace alidade {
 
 MapState kept_map(const MapState& map) {
@@ -43,6 +45,14 @@ const char* to_string(CalibrationNeed need) {
       return "tilt more";
     case CalibrationNeed::kAcceleration:
       return "accelerate";
+    case CalibrationNeed::kFarther:
+      return to_string(HelpfulMotion::kFarther);
+    case CalibrationNeed::kVaried:
+      return to_string(HelpfulMotion::kVaried);
+    case CalibrationNeed::kFaster:
+      return to_string(HelpfulMotion::kFaster);
+    case CalibrationNeed::kAcross:
+      return to_string(HelpfulMotion::kAcross);
     case CalibrationNeed::kTexture:
       return "scene too plain";
     case CalibrationNeed::kAgreement:

@@ -48,6 +48,10 @@ enum class CalibrationNeed : std::uint8_t {
   kPan,            // the camera only tilts
   kTilt,           // the camera only pans
   kAcceleration,   // constant velocity: clock offset and line delay stay unknown
+  kFarther,        // a calibration was found, but its focal length is too uncertain
+  kVaried,         // likewise its clock offset
+  kFaster,         // likewise its line delay
+  kAcross,         // likewise its distortion
   kTexture,        // scene too plain: too few landmarks
   kAgreement,      // telemetry does not describe the motion in the video
   kPictures,       // most pictures never come here: the machine has too much to do

@@ -3,12 +3,31 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <optional>
+
+#include "core/calibration/calibration_goals.h"
 
 namespace alidade {
 namespace {
 
 constexpr double kFewPictures = 0.5;  // of those that the camera took
 constexpr double kRepeats = 0.01;     // of the pictures; more than a slip, as `check` has it
+
+CalibrationNeed need_of(const std::optional<ParameterGoals>& goals) {
+  const ParameterGoal* farthest = goals ? farthest_goal(*goals) : nullptr;
+  if (farthest == nullptr) return CalibrationNeed::kTime;
+  switch (farthest->helps) {
+    case HelpfulMotion::kFarther:
+      return CalibrationNeed::kFarther;
+    case HelpfulMotion::kVaried:
+      return CalibrationNeed::kVaried;
+    case HelpfulMotion::kFaster:
+      return CalibrationNeed::kFaster;
+    case HelpfulMotion::kAcross:
+      return CalibrationNeed::kAcross;
+  }
+  return CalibrationNeed::kTime;
+}
 
 CalibrationNeed need_of(const CheckedCalibration& checked) {
   const CalibrationResult& result = checked.result;
@@ -24,7 +43,7 @@ CalibrationNeed need_of(const CheckedCalibration& checked) {
     case CalibrationStatus::kTelemetryMismatch:
       return CalibrationNeed::kAgreement;
     case CalibrationStatus::kWeak:
-      return result.quality.weak_in_time ? CalibrationNeed::kAcceleration : CalibrationNeed::kTime;
+      return need_of(result.goals);
     default:
       return CalibrationNeed::kTime;
   }

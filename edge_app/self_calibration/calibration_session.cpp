@@ -70,6 +70,59 @@ void CalibrationSession::add_keyframe(const ImageView& image) {
   while (images_.size() > 1 && bytes() > limits_.max_keyframe_bytes) images_.erase(images_.begin());
 }
 
+template <class Visit>
+void CalibrationSession::visit_angles(const Visit& visit) const {
+  if (frames_.empty()) return;
+  const double begin_s = frames_.front().stamp.receive_time_s;
+  std::optional<double> pan;
+  for (const PanTiltSample& sample : telemetry_) {
+    if (sample.latest_time_s < begin_s || sample.latest_time_s > newest_s()) continue;
+    pan = pan ? *pan + wrap_angle(sample.pan_rad - *pan) : sample.pan_rad;
+    visit(sample.latest_time_s, PanTilt<double>{*pan, sample.tilt_rad});
+  }
+}
+
+std::optional<AngleRange> CalibrationSession::angle_range() const {
+  std::optional<AngleRange> range;
+  visit_angles([&range](double, const PanTilt<double>& angle) {
+    if (!range) range = AngleRange{angle, angle};
+    range->least = {std::min(range->least.pan, angle.pan), std::min(range->least.tilt, angle.tilt)};
+    range->largest = {std::max(range->largest.pan, angle.pan),
+                      std::max(range->largest.tilt, angle.tilt)};
+  });
+  return range;
+}
+
+ViewCoverage CalibrationSession::coverage(int width, int height) const {
+  ViewCoverage coverage;
+  const auto cell = [](double at, int size, std::size_t cells) {
+    const double place = std::floor(at / size * static_cast<double>(cells));
+    return static_cast<std::size_t>(std::clamp(place, 0.0, static_cast<double>(cells - 1)));
+  };
+  for (const KeptFrame& frame : frames_) {
+    for (const TrackedPoint& point : frame.points) {
+      ++coverage.points[cell(point.v_px, height, ViewCoverage::kRows) * ViewCoverage::kColumns +
+                        cell(point.u_px, width, ViewCoverage::kColumns)];
+    }
+  }
+  coverage.range = angle_range();
+  constexpr double kRateSpan_s = 0.2;  // shorter differences would show the noise
+  std::deque<std::pair<double, PanTilt<double>>> latest;
+  std::vector<PanTilt<double>> all;
+  visit_angles([&](double time_s, const PanTilt<double>& angle) {
+    all.push_back(angle);
+    latest.emplace_back(time_s, angle);
+    while (latest.size() > 1 && time_s - latest[1].first >= kRateSpan_s) latest.pop_front();
+    const double span_s = time_s - latest.front().first;
+    if (span_s < kRateSpan_s) return;
+    const double turn = (angle.vector() - latest.front().second.vector()).norm();
+    coverage.largest_rate = std::max(coverage.largest_rate, turn / span_s);
+  });
+  const std::size_t stride = (all.size() + ViewCoverage::kMostPath - 1) / ViewCoverage::kMostPath;
+  for (std::size_t i = 0; i < all.size(); i += stride) coverage.path.push_back(all[i]);
+  return coverage;
+}
+
 std::vector<FrameStamp> CalibrationSession::stamps() const {
   std::vector<FrameStamp> stamps;
   for (const KeptFrame& frame : frames_) stamps.push_back(frame.stamp);

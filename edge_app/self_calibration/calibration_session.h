@@ -12,6 +12,7 @@
 #include <cstdint>
 #include <deque>
 #include <memory>
+#include <optional>
 #include <unordered_map>
 #include <vector>
 
@@ -21,6 +22,7 @@
 #include "core/realtime/image/image_view.h"
 #include "edge_app/self_calibration/keyframe_map.h"
 #include "edge_app/self_calibration/packed_image.h"
+#include "edge_app/self_calibration/view_coverage.h"
 #include "edge_app/step/calibration_feed.h"
 #include "platform/pan_tilt/pan_tilt_source.h"
 
@@ -60,6 +62,11 @@ class CalibrationSession {
   [[nodiscard]] double span_s() const;
   [[nodiscard]] double newest_s() const;
 
+  // Of the telemetry in the time of the frames; empty: there is none.
+  [[nodiscard]] std::optional<AngleRange> angle_range() const;
+  // width, height: of the image, px.
+  [[nodiscard]] ViewCoverage coverage(int width, int height) const;
+
   // Of the frames, in order of arrival.
   [[nodiscard]] std::vector<FrameStamp> stamps() const;
   [[nodiscard]] std::vector<PanTiltSample> telemetry() const;
@@ -83,6 +90,10 @@ class CalibrationSession {
     double pan, tilt;  // rad, measured, of the last sample before it
     std::shared_ptr<const PackedImage> image;
   };
+
+  // Calls visit(time_s, angle) for each sample in the time of the frames; pan is continuous.
+  template <class Visit>
+  void visit_angles(const Visit& visit) const;
 
   SessionLimits limits_;
   std::deque<KeptFrame> frames_;

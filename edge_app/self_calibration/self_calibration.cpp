@@ -66,6 +66,8 @@ void SelfCalibration::begin_anew() {
   session_.clear();
   first_node_is_wanted_ = false;
   pace_.begin_anew();
+  refusal_.clear();
+  goals_.reset();
   disagreement_.restart();
 }
 
@@ -161,7 +163,7 @@ bool SelfCalibration::adjusting_is_due() const {
   if (!options_.automatic || session_.frames() < 3 || !zoom_.has_settled(streams_.now_s())) {
     return false;
   }
-  if (!is_calibrated_here() || publication_.is_fresh_wanted()) return pace_.first_is_due(session_);
+  if (wants_first()) return pace_.first_is_due(session_);
   if (makes_nodes() && !nodes_.has_visit()) return pace_.node_is_due(session_);
   return pace_.watch_is_due(session_, !publication_.clock_holds());
 }
@@ -262,9 +264,10 @@ void SelfCalibration::try_first() {
   const CalibrationRefusal refusal =
       why_refused(checked, session_.frames(), streams_.repeated_share());
   need_ = refusal.need;
-  messages_.say_once(
-      (publication_.is_fresh_wanted() ? "no fresh calibration yet" : "not calibrated yet") +
-      refusal.why);
+  goals_ = checked.result.goals;
+  refusal_ = (publication_.is_fresh_wanted() ? "no fresh calibration yet" : "not calibrated yet") +
+             refusal.why;
+  messages_.say_once(refusal_);
 }
 
 void SelfCalibration::hold_against_published() {
@@ -374,10 +377,10 @@ std::shared_ptr<const PublishedCalibration> SelfCalibration::work() {
     make_first_node();
   } else if (adjusting_is_due()) {
     pace_.note_try(session_);
-    if (is_calibrated_here() && !publication_.is_fresh_wanted()) {
-      hold_against_published();
-    } else {
+    if (wants_first()) {
       try_first();
+    } else {
+      hold_against_published();
     }
   }
   return publication_.take_next();
@@ -393,15 +396,43 @@ CalibrationReport SelfCalibration::report() const {
   const std::optional<CalibrationNeed> missing = streams_.missing();
   if (unsteady) {
     report.need = *unsteady;
-  } else if (is_calibrated_here() && !publication_.is_fresh_wanted()) {
+  } else if (!wants_first()) {
     report.need = CalibrationNeed::kNothing;
   } else if (missing) {
     report.need = *missing;
   } else if (!zoom_.has_settled(streams_.now_s())) {
     report.need = CalibrationNeed::kSteadyZoom;
   } else {
-    report.need = pace_.has_tried() ? need_ : CalibrationNeed::kTime;
+    report.need = pace_.has_tried() ? need_ : missing_motion();
   }
   return report;
 }
+
+// Before the first try nothing but the range of the angles tells.
+CalibrationNeed SelfCalibration::missing_motion() const {
+  constexpr double kSeen_s = 1;
+  const std::optional<AngleRange> range = session_.angle_range();
+  if (!range || session_.span_s() < kSeen_s) return CalibrationNeed::kTime;
+  const Camera<double>& camera = publication_.calibration().camera;
+  const double least = travel_limits(camera.focal_length, camera.width).least;
+  const bool pans = range->largest.pan - range->least.pan >= least;
+  const bool tilts = range->largest.tilt - range->least.tilt >= least;
+  if (pans && tilts) return CalibrationNeed::kTime;
+  return pans ? CalibrationNeed::kTilt : tilts ? CalibrationNeed::kPan : CalibrationNeed::kMotion;
+}
+
+std::optional<CalibrationProgress> SelfCalibration::progress() const {
+  if (!options_.automatic || !wants_first()) return std::nullopt;
+  const Camera<double>& camera = publication_.calibration().camera;
+  CalibrationProgress progress;
+  progress.attempts = pace_.tries();
+  progress.refusal = refusal_;
+  progress.goals = goals_.value_or(calibration_goals(camera));
+  progress.travel = travel_limits(camera.focal_length, camera.width);
+  progress.span_s = session_.span_s();
+  progress.coverage =
+      session_.coverage(options_.data_sheet.camera.width, options_.data_sheet.camera.height);
+  return progress;
+}
+
 }  // namespace alidade

@@ -18,6 +18,7 @@
 #include "core/realtime/image/image_view.h"
 #include "edge_app/record/published_calibration.h"
 #include "edge_app/self_calibration/calibration_archive.h"
+#include "edge_app/self_calibration/calibration_progress.h"
 #include "edge_app/self_calibration/calibration_schedule.h"
 #include "edge_app/self_calibration/calibration_session.h"
 #include "edge_app/self_calibration/calibration_watch.h"
@@ -73,6 +74,9 @@ class SelfCalibration {
   [[nodiscard]] std::shared_ptr<const PublishedCalibration> work();
 
   [[nodiscard]] CalibrationReport report() const;
+  // How far the first calibration is, or the fresh one that was asked for; empty: none is wanted.
+  // Costs a pass over the session.
+  [[nodiscard]] std::optional<CalibrationProgress> progress() const;
   // Thread-safe. Asks for a new calibration, from the motion from now on. The new calibration
   // replaces the present one as soon as it passes the checks of a first calibration. False:
   // calibration is not automatic.
@@ -97,6 +101,10 @@ class SelfCalibration {
   // Takes the published calibration back and begins anew. reason, question: for the message.
   void withdraw(const std::string& reason, const std::string& question);
   [[nodiscard]] bool is_calibrated_here() const;
+  [[nodiscard]] bool wants_first() const {
+    return !is_calibrated_here() || publication_.is_fresh_wanted();
+  }
+  [[nodiscard]] CalibrationNeed missing_motion() const;
   [[nodiscard]] bool storing_is_due() const;
   [[nodiscard]] bool adjusting_is_due() const;
   [[nodiscard]] bool makes_nodes() const { return zooms_ && zoom_.reading().has_value(); }
@@ -137,7 +145,10 @@ class SelfCalibration {
   CalibrationSession session_;
   FrameTracks::Tracker tracker_ = FrameTracks::Tracker::kNone;  // of the session's points
   TryPace pace_;
-  CalibrationNeed need_ = CalibrationNeed::kNothing;  // of the last try
+  // Of the last try for a first calibration. Without goals, it did not come so far.
+  CalibrationNeed need_ = CalibrationNeed::kNothing;
+  std::string refusal_;
+  std::optional<ParameterGoals> goals_;
 
   PresentZoom zoom_;
   bool zooms_;  // the camera has more than one zoom

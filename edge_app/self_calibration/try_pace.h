@@ -25,6 +25,7 @@ class TryPace {
   // This try was for a first calibration.
   void note_first() { ++tries_; }
   [[nodiscard]] bool has_tried() const { return tries_ > 0; }
+  [[nodiscard]] int tries() const { return tries_; }
 
   // The next test of the calibration comes after `pause_s`.
   void watch_after(double pause_s) { watch_interval_s_ = pause_s; }

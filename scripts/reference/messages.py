@@ -7,10 +7,11 @@ import yaml
 from . import cpp
 
 LIST = "docs/manual/reference/messages.yaml"
-# Group of words: the function that says them, and its file.
+# Group of words: the functions that say them, and their files.
 WORDS = {
     "activities of the calibration": ("edge_app/record/published_calibration.cpp", r"to_string\(CalibrationActivity"),
-    "needs of the calibration": ("edge_app/record/published_calibration.cpp", r"to_string\(CalibrationNeed"),
+    "needs of the calibration": ("edge_app/record/published_calibration.cpp", r"to_string\(CalibrationNeed",
+                                 "core/calibration/calibration_goals.cpp", r"to_string\(HelpfulMotion"),
     "refusals of a calibration": ("core/calibration/calibration_types.cpp", r"to_string\(CalibrationStatus"),
     "localization": ("core/mapping/localization.cpp", r"to_string\(LocalizationStatus"),
     "building a map": ("core/mapping/map_building.cpp", r"to_string\(MapBuild"),
@@ -32,9 +33,10 @@ def body_of(file, head):
 
 
 def words(group):
-    file, head = WORDS[group]
+    files_and_heads = iter(WORDS[group])
+    bodies = "".join(body_of(file, head) for file, head in zip(files_and_heads, files_and_heads))
     # `return "words";`, or with a label before them: `return {"label", "words"};`
-    said = [cpp.string(one) for one in re.findall(r'return (?:\{"\w+",\s*)?((?:"(?:[^"\\]|\\.)*"\s*)+)\}?;', body_of(file, head))]
+    said = [cpp.string(one) for one in re.findall(r'return (?:\{"\w+",\s*)?((?:"(?:[^"\\]|\\.)*"\s*)+)\}?;', bodies)]
     return [word for word in dict.fromkeys(said) if not word.startswith(UNTOLD[0]) and word != ""]
 
 

@@ -163,6 +163,8 @@ class PageWords(unittest.TestCase):
         code, page = read("edge_app/record/published_calibration.cpp"), read("edge_app/output/page/words.js")
         for kind, constant in (("CalibrationActivity", "kActivities"), ("CalibrationNeed", "kNeeds")):
             told = set(re.findall(rf'case {kind}::\w+:\s+return "(.+)";', code))
+            if kind == "CalibrationNeed":
+                told |= set(re.findall(r'case HelpfulMotion::\w+:\s+return "(.+)";', read("core/calibration/calibration_goals.cpp")))
             begin = page.index(f"export const {constant} = {{")
             said = set(re.findall(r"^  '?(.+?)'?:(?:$| ')", page[begin:page.index("\n}", begin)], re.MULTILINE))
             self.assertGreater(len(told), 4)

@@ -43,6 +43,10 @@ export const kNeeds = {
   'pan more': 'Please pan the camera more.',
   'tilt more': 'Please tilt the camera more.',
   'accelerate': 'Please vary the speed of the motion.',
+  'move farther on both axes': 'Please move farther, to the left and right, up and down.',
+  'change speed and direction more and faster': 'Please turn to and fro, and change the speed more.',
+  'move faster while the image is read out': 'Please move faster.',
+  'let landmarks cross the whole image': 'Please move what is in view across the whole picture, into its corners, too.',
   'scene too plain': 'The scene is too plain: point the camera at something with more detail.',
   'telemetry that describes the motion in the video': 'Readings and video do not agree: check the connection and the signs of the axes.',
   'more of the pictures: the machine is too slow or too busy':

@@ -43,7 +43,6 @@ struct Limit {
   Parameter parameter;
   double sigma;
   const char* words;
-  bool in_time;
 };
 
 class JudgeAtItsLimits : public testing::TestWithParam<Limit> {};
@@ -52,11 +51,17 @@ TEST_P(JudgeAtItsLimits, PublishesWhatIsJustGoodEnoughAndNothingBeyond) {
   const Limit& limit = GetParam();
   const CalibrationResult below = judged_with(limit.parameter, 0.999 * limit.sigma);
   EXPECT_EQ(below.status, CalibrationStatus::kOk) << below.message;
-  EXPECT_FALSE(below.quality.weak_in_time);
+  ASSERT_TRUE(below.goals);
+  EXPECT_EQ(farthest_goal(*below.goals), nullptr);
   const CalibrationResult above = judged_with(limit.parameter, 1.001 * limit.sigma);
   EXPECT_EQ(above.status, CalibrationStatus::kWeak);
   EXPECT_THAT(above.message, HasSubstr(limit.words));
-  EXPECT_EQ(above.quality.weak_in_time, limit.in_time);
+  // What is told of the progress is what was judged, and the refusal asks for the same motion.
+  const ParameterGoal* weakest = farthest_goal(above.goals.value());
+  ASSERT_NE(weakest, nullptr);
+  EXPECT_EQ(weakest->parameter, limit.parameter);
+  EXPECT_NEAR(*weakest->sigma / weakest->wanted, 1.001, 1e-9);
+  EXPECT_THAT(above.message, HasSubstr(std::string(": ") + to_string(weakest->helps)));
 }
 
 // Half the diagonal of 1920 x 1080 px, in units of the focal length of 2000 px.
@@ -65,15 +70,41 @@ const double kCorner = std::sqrt(960.0 * 960 + 540.0 * 540) / 2000;
 INSTANTIATE_TEST_SUITE_P(
     Sufficiency, JudgeAtItsLimits,
     testing::Values(Limit{Parameter::kFocalLength, 0.05 * 2000,
-                          "focal length known to 5.0 % only, 5 % are needed", false},
+                          "focal length known to 5.0 % only, 5 % are needed"},
                     Limit{Parameter::kClockOffset, 0.01,
-                          "clock offset known to 10.0 ms only, 10 ms are needed", true},
+                          "clock offset known to 10.0 ms only, 10 ms are needed"},
                     Limit{Parameter::kLineDelay, 5e-3 / 1080,
-                          "read-out known to 5.0 ms only, 5 ms are needed", true},
+                          "read-out known to 5.0 ms only, 5 ms are needed"},
                     Limit{Parameter::kRadialDistortion, 0.02 / (kCorner * kCorner),
-                          "radial distortion known to 2.0 % of the radius only, 2 % are needed",
-                          false}),
+                          "radial distortion known to 2.0 % of the radius only, 2 % are needed"}),
     [](const auto& limit) { return std::string(to_string(limit.param.parameter)); });
+
+TEST(CalibrationGoals, TheFarthestIsTheOneWhoseSigmaIsMostTimesWhatIsWanted) {
+  ParameterGoals goals = calibration_goals({2000, 1, {0}, 1920, 1080});
+  EXPECT_EQ(farthest_goal(goals), nullptr);  // none has a sigma yet
+  for (ParameterGoal& goal : goals) goal.sigma = 2 * goal.wanted;
+  goals[2].sigma = 3 * goals[2].wanted;
+  EXPECT_EQ(farthest_goal(goals), &goals[2]);
+  goals[2].reached = true;
+  EXPECT_EQ(farthest_goal(goals), &goals[0]);
+}
+
+// A scale that only its prior knows cannot be told from the focal length: more motion is no help.
+TEST(Judge, CallsAFocalLengthReachedThatOnlyTheScaleLeavesOpen) {
+  CalibrationOptions options;
+  options.pan_scale.sigma = 0.1;
+  CalibrationResult result = good_result();
+  auto& cov = result.calibration.covariance;
+  const int f = index(Parameter::kFocalLength);
+  const int s = index(Parameter::kPanScale);
+  cov(f, f) = std::pow(0.1 * 2000, 2);
+  cov(s, s) = std::pow(0.1, 2);
+  cov(f, s) = cov(s, f) = 0.99 * 0.1 * 2000 * 0.1;
+  judge(options, kMotion, &result);
+  EXPECT_EQ(result.status, CalibrationStatus::kOk);
+  EXPECT_EQ(farthest_goal(result.goals.value()), nullptr);
+  EXPECT_GT(*result.goals->front().sigma, result.goals->front().wanted);
+}
 
 TEST(Judge, NamesTheParametersThatAreUncertainTogether) {
   CalibrationResult result = good_result();

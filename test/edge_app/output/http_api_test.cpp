@@ -50,6 +50,7 @@ class HttpApiTest : public ::testing::Test {
     sources.ask_for_calibration = [this] { return asked_ = calibrating_; };
     sources.zoom_curve = [this] { return curve_; };
     sources.telemetry_error = [this] { return telemetry_error_; };
+    sources.calibration_progress = [this] { return progress_; };
     sources.plane = std::move(plane);
     sources.fit_plane = [](const std::string& body, std::string* answer, std::string* why) {
       *answer = "{\"status\": \"ok\"}\n";
@@ -83,6 +84,7 @@ class HttpApiTest : public ::testing::Test {
   PipelineSummary summary_;
   std::shared_ptr<const ZoomCurve> curve_;
   std::shared_ptr<const TelemetryError> telemetry_error_;
+  std::shared_ptr<const CalibrationProgress> progress_;
   bool calibrating_ = false;
   bool asked_ = false;
   HttpServer server_{HttpServerOptions{}};
@@ -107,6 +109,40 @@ OrientationRecord record_without_orientation(std::int64_t frame) {
   record.time_s = 100 + 0.04 * static_cast<double>(frame);
   record.status = RecordStatus::kTelemetryMissing;
   return record;
+}
+
+TEST_F(HttpApiTest, StatusTellsHowFarACalibrationIs) {
+  const auto told = [this] { return body_of(get("/api/v1/status"))["calibration"]["progress"]; };
+  EXPECT_TRUE(told().is_null());
+  CalibrationProgress progress;
+  progress.goals = calibration_goals({2000, 1, {0}, 1920, 1080});
+  progress.travel = travel_limits(2000, 1920);
+  progress_ = std::make_shared<const CalibrationProgress>(progress);
+  json first = told();
+  EXPECT_EQ(first["attempts"], 0);
+  EXPECT_TRUE(first["refusal"].is_null());
+  ASSERT_EQ(first["parameters"].size(), 4U);
+  EXPECT_EQ(first["parameters"][0],
+            json::parse(R"({"name": "focal_length", "unit": "px", "sigma": null, "wanted": 100,
+    "reached": false, "helps": "move farther on both axes"})"));
+  EXPECT_TRUE(first["coverage"]["pan_rad"].is_null());
+  EXPECT_EQ(first["coverage"]["points"].size(), 48U);
+  EXPECT_DOUBLE_EQ(first["asked_range_rad"].get<double>(), 0.24);
+
+  progress.attempts = 3;
+  progress.refusal = "not calibrated yet (too uncertain): ...";
+  progress.goals[0].sigma = 40;
+  progress.goals[0].reached = true;
+  progress.coverage.range = AngleRange{{-0.1, 0}, {0.2, 0.05}};
+  progress.coverage.path = {{-0.1, 0}, {0.2, 0.05}};
+  progress_ = std::make_shared<const CalibrationProgress>(progress);
+  first = told();
+  EXPECT_EQ(first["refusal"], progress.refusal);
+  EXPECT_EQ(first["parameters"][0]["sigma"], 40);
+  EXPECT_EQ(first["parameters"][0]["reached"], true);
+  EXPECT_EQ(first["coverage"]["pan_rad"], json({-0.1, 0.2}));
+  EXPECT_EQ(first["coverage"]["tilt_rad"], json({0, 0.05}));
+  EXPECT_EQ(first["coverage"]["path_rad"], json::parse("[[-0.1, 0], [0.2, 0.05]]"));
 }
 
 TEST_F(HttpApiTest, BeforeTheFirstRecordThereIsNothingAndThatIsSaid) {

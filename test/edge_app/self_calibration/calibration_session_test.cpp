@@ -4,7 +4,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <utility>
+#include <vector>
 
 #include "core/model/trigonometry.h"
 #include "edge_app/self_calibration/packed_image.h"
@@ -69,6 +71,45 @@ TEST_F(CalibrationSessionTest, ForgetsWhatIsOlderThanItsWindow) {
   // Telemetry reaches farther back, as the clock offset may be so large.
   EXPECT_EQ(session_.telemetry().front().latest_time_s,
             100 - limits_.window_s - limits_.telemetry_margin_s);
+}
+
+TEST_F(CalibrationSessionTest, TellsWhichPartsOfTheImageWereSeenAndWhereTheHeadWas) {
+  EXPECT_FALSE(session_.coverage(kWidth, kHeight).range);
+  session_.add(sample(-1, 1, 1));  // before the frames: not of their motion
+  // Over half a turn, to and fro.
+  const double pans[] = {3.0, 3.1, -3.1, -3.0, -3.1};
+  for (int i = 0; i < 5; ++i) {
+    session_.add(sample(i, pans[i], 0.01 * i));
+    FrameTracks seen = tracks(i, i);
+    seen.count = 2;
+    seen.points[0] = {1, 0.5F, 0.5F, 0.1F};
+    seen.points[1] = {2, kWidth, 0.6F * kHeight, 0.1F};  // on the border: of the last column
+    session_.add(seen);
+  }
+  const ViewCoverage coverage = session_.coverage(kWidth, kHeight);
+  const std::size_t right = 3 * ViewCoverage::kColumns + ViewCoverage::kColumns - 1;
+  for (std::size_t i = 0; i < coverage.points.size(); ++i)
+    EXPECT_EQ(coverage.points[i], i == 0 || i == right ? 5 : 0) << i;
+  ASSERT_TRUE(coverage.range);
+  EXPECT_NEAR(coverage.range->least.pan, 3.0, 1e-12);
+  EXPECT_NEAR(coverage.range->largest.pan, 2 * kPi - 3.0, 1e-12);
+  EXPECT_EQ(coverage.range->least.tilt, 0);
+  EXPECT_NEAR(coverage.range->largest.tilt, 0.04, 1e-12);
+  EXPECT_EQ(coverage.path.size(), 5U);
+  // Of the first second. That over half a turn is slower, and no turn of 6.2 rad.
+  EXPECT_NEAR(coverage.largest_rate, std::hypot(0.1, 0.01), 1e-12);
+}
+
+TEST_F(CalibrationSessionTest, ThinsOutAPathThatIsLong) {
+  for (int i = 0; i < 1000; ++i) {
+    session_.add(sample(0.01 * i, 0.001 * i));
+    session_.add(tracks(i, 0.01 * i));
+  }
+  const std::vector<PanTilt<double>> path = session_.coverage(kWidth, kHeight).path;
+  EXPECT_LE(path.size(), ViewCoverage::kMostPath);
+  EXPECT_GT(path.size(), ViewCoverage::kMostPath / 2);
+  EXPECT_EQ(path.front().pan, 0);
+  EXPECT_NEAR(path.back().pan, 0.999, 0.02);
 }
 
 TEST_F(CalibrationSessionTest, KeepsNoMoreThanItsNumberOfFrames) {

@@ -9,6 +9,7 @@
 #include <time.h>
 
 #include <functional>
+#include <optional>
 #include <thread>
 
 #include "test/edge_app/self_calibration/fed_calibration.h"
@@ -54,6 +55,7 @@ TEST(SelfCalibration, BeginsWithTheDataSheetAndPublishesOnceTheMotionSuffices) {
   expect_truth(s, published[0].calibration->calibration);
   EXPECT_EQ(calibration.report().activity, CalibrationActivity::kWatching);
   EXPECT_EQ(calibration.report().need, CalibrationNeed::kNothing);
+  EXPECT_FALSE(calibration.progress());
   EXPECT_THAT(calibration.take_messages(), Contains(HasSubstr("calibrated from")));
   EXPECT_THAT(calibration.take_messages(), IsEmpty());
 }
@@ -65,6 +67,7 @@ TEST(SelfCalibration, HearsNothingWhileItIsNotAutomatic) {
   SelfCalibration calibration(options, nullptr);
   EXPECT_THAT(feed(&calibration, s, {}), IsEmpty());
   EXPECT_EQ(calibration.report().activity, CalibrationActivity::kOff);
+  EXPECT_FALSE(calibration.progress());
   EXPECT_FALSE(calibration.ask_for_fresh());
 }
 
@@ -98,6 +101,78 @@ INSTANTIATE_TEST_SUITE_P(
         Unsuitable{"TiltOnly", [](double x) { return Eigen::Vector2d(0.0, 0.4 * std::sin(x)); },
                    CalibrationNeed::kPan}),
     [](const auto& p) { return p.param.name; });
+
+// What is told at the moment at which the first try is due.
+struct FirstTold {
+  std::optional<CalibrationProgress> progress;
+  CalibrationNeed need = CalibrationNeed::kNothing;
+};
+
+FirstTold before_the_first_try(SelfCalibration* calibration, const test::Simulation& s) {
+  FirstTold told;
+  Feed how;
+  how.before_adjusting = [&] {
+    if (told.progress) return;
+    told = {calibration->progress(), calibration->report().need};
+  };
+  static_cast<void>(feed(calibration, s, how));
+  return told;
+}
+
+TEST(SelfCalibration, TellsItsGoalsAndTheMotionThatIsMissingBeforeItsFirstTry) {
+  test::Simulation s = camera();
+  s.path = [](double x) { return Eigen::Vector2d(0.4 * std::sin(x), 0.0); };
+  const SelfCalibrationOptions options = options_for(s);
+  SelfCalibration calibration(options, nullptr);
+  const FirstTold told = before_the_first_try(&calibration, s);
+  EXPECT_STREQ(to_string(told.need), to_string(CalibrationNeed::kTilt));
+  ASSERT_TRUE(told.progress);
+  EXPECT_EQ(told.progress->attempts, 0);
+  EXPECT_EQ(told.progress->refusal, "");
+  EXPECT_GE(told.progress->span_s, options.schedule.first_try_s);
+  for (const ParameterGoal& goal : told.progress->goals) {
+    EXPECT_FALSE(goal.sigma) << to_string(goal.parameter);
+    EXPECT_GT(goal.wanted, 0);
+    EXPECT_FALSE(goal.reached);
+  }
+  const auto& range = told.progress->coverage.range;
+  ASSERT_TRUE(range);
+  EXPECT_NEAR(range->largest.pan - range->least.pan, 0.8, 0.02);
+  EXPECT_LT(range->largest.tilt - range->least.tilt, told.progress->travel.least);
+  // Afterwards the attempts, and what was said of the last.
+  const std::optional<CalibrationProgress> later = calibration.progress();
+  ASSERT_TRUE(later);
+  EXPECT_GT(later->attempts, 1);
+  EXPECT_THAT(later->refusal, HasSubstr("not calibrated yet (one axis only): tilt"));
+}
+
+// The sigmas by which the thread decided, and one word for the motion that helps: of the record, and
+// of the line that says why there is no calibration.
+TEST(SelfCalibration, TellsByWhichSigmasItDecidedAndAsksForTheMotionThatTheWorstNeeds) {
+  test::Simulation s = camera();
+  // Slowly, and seen with much noise: all but the line delay shows.
+  const double reach = 0.04 * s.field_of_view();
+  s.path = [reach](double x) {
+    return Eigen::Vector2d(reach * std::sin(0.3 * x), 0.8 * reach * std::cos(0.51 * x));
+  };
+  s.pixel_sigma = 3;
+  s.duration_s = 9;
+  SelfCalibration calibration(options_for(s), nullptr);
+  EXPECT_THAT(feed(&calibration, s, {}), IsEmpty());
+  const std::optional<CalibrationProgress> progress = calibration.progress();
+  ASSERT_TRUE(progress);
+  const ParameterGoal* worst = farthest_goal(progress->goals);
+  ASSERT_NE(worst, nullptr) << progress->refusal;
+  EXPECT_EQ(worst->parameter, Parameter::kLineDelay);
+  EXPECT_GT(*worst->sigma, worst->wanted);
+  EXPECT_EQ(calibration.report().need, CalibrationNeed::kFaster);
+  EXPECT_STREQ(to_string(calibration.report().need), to_string(worst->helps));
+  EXPECT_THAT(progress->refusal, HasSubstr(to_string(worst->helps)));
+  for (const ParameterGoal& goal : progress->goals) {
+    ASSERT_TRUE(goal.sigma);
+    EXPECT_EQ(goal.reached, &goal != worst) << to_string(goal.parameter);
+  }
+}
 
 TEST(SelfCalibration, AsksForTextureWhereHardlyAnythingIsSeen) {
   test::Simulation s = camera();
@@ -260,6 +335,8 @@ TEST(SelfCalibration, KeepsTheOldCalibrationUntilTheFreshOneIsThereAndSaysWhatTh
               IsEmpty());
   EXPECT_EQ(calibration.report().activity, CalibrationActivity::kWatching);
   EXPECT_EQ(calibration.report().need, CalibrationNeed::kMotion);
+  ASSERT_TRUE(calibration.progress());
+  EXPECT_THAT(calibration.progress()->refusal, HasSubstr("no fresh calibration yet (no motion)"));
   EXPECT_THAT(calibration.take_messages(), Contains(HasSubstr("no fresh calibration yet")));
 }
 
