@@ -56,7 +56,8 @@ class FrameClock {
         receipts_(stamp_sigma_s),
         uneven_(stamp_sigma_s) {}
 
-  // The connection that begins with the next frame has no backlog.
+  // The connection that begins with the next frame has no backlog. If later frames show that the
+  // first ones had waited, the clock begins anew all the same.
   void expect_fresh() { fresh_ = true; }
 
   FrameTime update(const FrameStamp& stamp) {
@@ -162,7 +163,6 @@ class FrameClock {
     const bool has_line = kind_ == Kind::kSenderTime && !waiting_ && !line_begins_ && !late_;
     utc_.end_connection(has_line ? &clock_.filter() : nullptr, wander_.off_s());
     kind_ = kind;
-    began_fresh_ = fresh_;
     waiting_ = kind == Kind::kSenderTime && !fresh_;
     fresh_ = fresh_ && kind == Kind::kNothing;
     fresh_by_utc_ = 0;
@@ -237,7 +237,7 @@ class FrameClock {
     const double before_s = by_count ? 0
                                      : stamp.receive_time_s - filter.delay_shift_s() -
                                            filter.to_host(*stamp.sender_time_s);
-    if (young && !began_fresh_ && before_s < -kEarly_s) return begin_again(stamp);
+    if (young && before_s < -kEarly_s) return begin_again(stamp);
     const double shift_s = filter.delay_shift_s();
     time.clock = ask_clock(stamp, line_begins_);
     if (line_begins_) line_since_s_ = stamp.receive_time_s;
@@ -327,7 +327,6 @@ class FrameClock {
   Kind kind_ = Kind::kNew;
   bool begins_ = true;  // begins with the next usable frame
   bool fresh_ = false;  // until arrivals make a frame's time known
-  bool began_fresh_ = false;
   int fresh_by_utc_ = 0;  // fresh first frames of the connection, in a row
   int strange_ = 0;       // frames with stamps of another kind, in a row
   bool waiting_ = false;  // for the sender's pace

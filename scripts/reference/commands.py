@@ -1,4 +1,6 @@
 """The tables of commands and options, from what builds the command line (edge_app/commands/command_line.cpp)."""
+import re
+
 from . import cpp
 
 FILE = "edge_app/commands/command_line.cpp"
@@ -10,8 +12,8 @@ def plain(text):
 
 
 def row(name, help_text, body):
-    begin = body.index(f'"{name}"')
-    needed = not name.startswith("-") or ".required()" in body[begin:body.index(";", begin)]
+    statement = re.sub(r'"(?:[^"\\]|\\.)*"', "", body[body.index(f'"{name}"'):]).partition(";")[0]
+    needed = not name.startswith("-") or "->required()" in statement
     return f"| `{name.replace(',', '`, `')}` | {'yes' if needed else ''} | {plain(help_text.strip())} |".replace("|  |", "| |")
 
 

@@ -201,6 +201,13 @@ class Commands(unittest.TestCase):
         self.assertGreater(seen, 50)
         self.assertFalse(wrong, "no such command or option: " + ", ".join(wrong))
 
+    def test_says_which_options_are_required(self):
+        text = r'"(?:[^"\\]|\\.)*"'
+        needed = re.findall(rf'add_option\(\s*"(-[^"]+)"(?:[^;"]|{text})*->required\(\)', read("edge_app/commands/command_line.cpp"))
+        said = re.findall(r"^\| (`-.*?`) \| yes \|", pages()["reference/commands.md"], re.MULTILINE)
+        self.assertGreater(len(needed), 4)
+        self.assertEqual(sorted(f"`{name.replace(',', '`, `')}`" for name in needed), sorted(said))
+
     def test_of_shells_can_be_read(self):
         for page, text in pages().items():
             for language, _, content in blocks(text):

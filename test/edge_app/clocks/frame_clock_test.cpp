@@ -99,6 +99,16 @@ TEST_F(FrameClockTest, AConnectionThatIsKnownToBeginFreshIsAnsweredFromItsFirstF
   }
 }
 
+// A host that is busy when a recording begins: the first frame waits for 50 ms, which is no backlog.
+TEST_F(FrameClockTest, AFirstFrameThatWasLateLeavesNoTraceInALineThatWasSaidToBeginFresh) {
+  clock_.expect_fresh();
+  EXPECT_TRUE(add(0, 0.05).known);
+  const FrameTime second = add(kInterval_s, 0.051);
+  EXPECT_FALSE(second.known);
+  EXPECT_TRUE(second.clock.restarted);
+  EXPECT_EQ(play(2 * kInterval_s, 4), 98 - 12);
+}
+
 TEST_F(FrameClockTest, ARecordingsLaterFramesTellWhetherTheFirstHadWaited) {
   for (const bool has_sender : {true, false}) {
     std::vector<FrameStamp> fresh;
