@@ -325,8 +325,8 @@ class FrameClock {
   StampJumps jumps_;
   UtcLine utc_;
   Kind kind_ = Kind::kNew;
-  bool begins_ = true;  // begins with the next usable frame
-  bool fresh_ = false;  // until arrivals make a frame's time known
+  bool begins_ = true;    // begins with the next usable frame
+  bool fresh_ = false;    // until arrivals make a frame's time known
   int fresh_by_utc_ = 0;  // fresh first frames of the connection, in a row
   int strange_ = 0;       // frames with stamps of another kind, in a row
   bool waiting_ = false;  // for the sender's pace

@@ -38,7 +38,8 @@ struct PanTiltConfig {
   std::optional<double> angle_sigma_rad;  // rad, white noise of one measured angle
   double angle_quantum_rad = 0;           // rad, step of the encoder or of its output
   double angle_accuracy_deg = 0;  // deg, the maker's claim, one standard deviation; 0: no claim
-  double acceleration_sigma_rad_s2 = 0.1;  // rad/s^2, assumed where the samples do not show it
+  // rad/s^2, assumed where the samples do not show it.
+  double acceleration_sigma_rad_s2 = TelemetryNoise().acceleration_sigma;
   // s, longest time between two measurements of the device; 0: each answer is a new measurement.
   double max_repeat_s = TelemetryLimits().max_repeat_s;
 };
