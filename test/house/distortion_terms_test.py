@@ -9,7 +9,7 @@ KINDS = "core/model/lens/distortion.h"
 # (file, first line, end) of the parts that name every term; None: to the file's beginning or end.
 PARTS = (("edge_app/output/openapi.yaml", "    ZoomCurve:", "    Calibration:"),
          ("edge_app/output/openapi.yaml", "    Calibration:", "    FrameNumber:"),
-         ("edge_app/output/page/calibration.js", "const kParameters = [", "];"),
+         ("edge_app/output/page/calibration.js", "export const kParameters = [", "];"),
          ("edge_app/output/page/calibration.js", "export async function showCalibrationInUse(", "}"),
          ("ros_wrapper/alidade_msgs/msg/Calibration.msg", None, None),
          ("ros_wrapper/alidade_msgs/msg/ZoomNode.msg", None, None),

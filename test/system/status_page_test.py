@@ -126,6 +126,19 @@ SHOW_AN_HOUR = """
     }));"""
 
 
+# A calibration whose distortion is not known well enough yet, while a focal length is.
+TOO_UNCERTAIN = {
+    "attempts": 3, "refusal": "not calibrated yet (too uncertain): radial distortion known to 8.2 % of the radius only: let landmarks cross the whole image",
+    "parameters": [
+        {"name": "focal_length", "unit": "px", "sigma": 53.3, "wanted": 533, "reached": True, "helps": "move farther on both axes"},
+        {"name": "clock_offset", "unit": "s", "sigma": .021, "wanted": .01, "reached": False, "helps": "change speed and direction more and faster"},
+        {"name": "line_delay", "unit": "s/row", "sigma": None, "wanted": 1.04e-5, "reached": False, "helps": "move faster while the image is read out"},
+        {"name": "radial_distortion", "unit": "1", "sigma": 1420, "wanted": 14.2, "reached": False, "helps": "let landmarks cross the whole image"}],
+    "span_s": 14.2, "least_range_rad": .0018, "asked_range_rad": .015,
+    "coverage": {"columns": 8, "rows": 6, "points": [0] * 8 + [30] * 40, "pan_rad": [-.12, .12], "tilt_rad": [-.02, .02],
+                 "path_rad": [[-.12, -.02], [0, .02], [.12, -.02]], "largest_rate_rad_s": .05}}
+
+
 class StatusPage(SystemTest):
     def setUp(self):
         super().setUp()
@@ -258,6 +271,7 @@ class StatusPage(SystemTest):
         self.wait_for_text("camera", r"rtsp://127\.0\.0\.1")
         self.wait_for_text("health", r"Frames[1-9]")
         self.assertNotIn("Scene map", self.text("health"))
+        self.assertFalse(self.browser.find_element(By.ID, "progress").is_displayed())
         with urllib.request.urlopen(address + "api/v1/status", timeout=DEADLINE_S) as answer:
             status = json.load(answer)
         self.assertIsNone(status["scene_map"])
@@ -490,6 +504,58 @@ class StatusPage(SystemTest):
                 self.assertTrue(any("of class" in name["text"] for name in plan), plan)
             self.screenshot(f"crowd_{width}.png")
         self.browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+    def test_shows_how_far_a_calibration_is_and_what_motion_is_missing(self):
+        # Over 7 % of the picture in pan, and 2.3 % in tilt, where 3 % are the least.
+        camera = self.camera(settings={**SETTINGS, "path": {"type": "triple_cosine", "amplitude": 0.024, "period_s": 6}})
+        image = SETTINGS["image"]
+        config = self.write_config(
+            camera, video={"width": image["width"], "height": image["height"]}, focal_length_px=SETTINGS["camera"]["focal_length_px"],
+            calibration={"file": str(self.folder / "calibration.yaml")}, realtime={"mode": "OE"}, output={"json": True, "http": "127.0.0.1:0"})
+        _, address = self.start(config)
+        self.browser.get(address)
+        self.wait_for_text("link", "^live$")
+        wait_until(lambda: self.browser.find_element(By.ID, "progress").is_displayed(), "the progress")
+        self.wait_for_text("calibrating", "Please tilt the camera more")
+        self.wait_for_text("motion-caption", "^Please tilt the camera more.$")
+        self.assertEqual(self.browser.find_element(By.ID, "motion").get_attribute("aria-label"), "Drawing: tilt more")
+        self.wait_for_text("refusal", r"^not calibrated yet \(one axis only\): tilt moves the image by ")
+        self.assertRegex(self.text("progress-caption"), r"^[1-9]\d* attempts?; \d+ s of motion are at hand$")
+        self.assertRegex(self.text("progress-rows"), r"^Focal length–\d+\spxClock offset–10\smsLine delay–10\sµs/rowRadial distortion–\d+$")
+        self.wait_for_text("cells-caption", r"^Points were seen in [1-9]\d* of 48 parts of the picture\.$")
+        self.wait_for_text("angles-caption", r"^Pan 0\.2\d° and tilt 0\.(0|1)\d° of the 0\.86° that are asked for\.$")
+        self.screenshot("calibrating.png")
+
+        self.browser.find_element(By.ID, "anew").send_keys(Keys.ENTER)
+        self.wait_for_text("anew-said", "^A fresh calibration is under way: move the camera; status says what it needs, and when it is done.$")
+        self.browser.find_element(By.ID, "anew").send_keys(Keys.ENTER)
+        self.wait_for_text("anew-said", r"^Not begun: a fresh calibration was begun \d+ s ago; the next may be in \d+ s.$")
+        self.shows_goals()
+        self.assert_no_errors_but(f"{LATE}|/api/v1/calibrate.*status of 429")
+
+    def shows_goals(self):
+        """Bars end left of the line, in the middle, where a sigma is small enough; at a phone's width nothing is cut off."""
+        bars = self.browser.execute_script("""
+            showProgress({needs: 'let landmarks cross the whole image', progress: arguments[0]});
+            return [...document.querySelectorAll('#progress-rows .bar')].map((bar) => {
+              const rect = bar.querySelector('rect');
+              return [Number(rect.getAttribute('width')), rect.getAttribute('class'), bar.getAttribute('aria-label')];
+            });""", TOO_UNCERTAIN)
+        self.assertEqual([(row[1], row[2]) for row in bars], [
+            ("good", "0.1 times what is wanted: reached"), ("fair", "2.1 times what is wanted"), ("fair", "not known yet"), ("fair", "100 times what is wanted")])
+        for (width, *_), expected in zip(bars, (25, 58.06, 0, 100)):
+            self.assertAlmostEqual(width, expected, places=1)
+        for width in (1280, 375):
+            self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {
+                "width": width, "height": 1400, "deviceScaleFactor": 1, "mobile": width < 500})
+            self.browser.execute_script("showProgress({needs: 'let landmarks cross the whole image', progress: arguments[0]})", TOO_UNCERTAIN)
+            self.screenshot(f"progress_{width}.png")
+            self.assertEqual(self.browser.execute_script("return document.documentElement.scrollWidth > innerWidth"), False, width)
+            self.assertEqual(self.browser.execute_script("""
+                return [...document.querySelectorAll('#progress *')].filter((one) => one.getBoundingClientRect().right > innerWidth).length"""), 0, width)
+        self.browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+        self.assertTrue(self.browser.execute_script(
+            "showProgress({needs: null, progress: null}); return document.getElementById('progress').hidden"))
 
     def test_says_that_the_program_is_gone_and_follows_the_next_one(self):
         camera = self.camera(settings=SETTINGS)

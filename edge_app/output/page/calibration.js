@@ -9,7 +9,7 @@ import {duration} from './time.js';
 import {showTelemetryError} from './telemetry_error.js';
 import {showZoomCurve} from './zoom_curve.js';
 
-const kParameters = [
+export const kParameters = [
   ['focal_length', 'Focal length', 1, 'px'],
   ['aspect', 'Aspect', 1, ''],
   ['radial_distortion', 'Radial distortion', 1, ''],

@@ -5,6 +5,7 @@ import {getJson} from './api.js';
 import {showCalibrationInUse} from './calibration.js';
 import {rows, say} from './elements.js';
 import {isNumber} from './numbers.js';
+import {showProgress} from './progress.js';
 import {showSceneMap} from './scene_map.js';
 import {connected} from './stream.js';
 import {duration, sleep} from './time.js';
@@ -80,6 +81,7 @@ export async function showStatusForEver() {
       try {
         const status = await getJson('/api/v1/status');
         showStatus(status);
+        showProgress(status.calibration);
         await showCalibrationInUse(status);
         await showSceneMap(status);
       } catch {
