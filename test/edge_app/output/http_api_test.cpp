@@ -82,6 +82,7 @@ class HttpApiTest : public ::testing::Test {
 
   LiveState live_{few_lines()};
   PipelineSummary summary_;
+  std::vector<SceneOutline> outlines_;
   std::shared_ptr<const ZoomCurve> curve_;
   std::shared_ptr<const TelemetryError> telemetry_error_;
   std::shared_ptr<const CalibrationProgress> progress_;
