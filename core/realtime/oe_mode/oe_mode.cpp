@@ -40,10 +40,11 @@ void OeMode::reset(const Calibration& calibration, FocalLength focal_length) {
   const Camera<double>& camera = calibration.camera;
   ready_ = camera.width > 0 && camera.height > 0 && camera.width <= options_.max_width &&
            camera.height <= options_.max_height && camera.focal_length > 0;
-  if (!ready_) return;
-  image_.reset(camera.height);
-  search_.reset(calibration);
-  map_.reset(calibration);
+  if (ready_) {
+    image_.reset(camera.height);
+    search_.reset(calibration);
+    map_.reset(calibration);
+  }
   offset_.forget_error();
   forget_map();
   drift_.reset();
