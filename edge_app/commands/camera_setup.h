@@ -29,7 +29,9 @@ struct CameraSetupResult {
   std::vector<std::string> remarks;  // one line each
 };
 
-// Throws CommandError, its line naming what is missing.
+// Throws CommandError if a file exists already, the camera cannot be used, a value is missing or
+// wrong, a link that is tried delivers nothing, or a file cannot be written. The error's line names
+// it.
 [[nodiscard]] CameraSetupResult set_up_camera(const CameraFindings& findings,
                                               const CameraSetupOptions& options);
 

@@ -21,8 +21,10 @@ struct DiscoverOptions {
   bool json = false;
 };
 
-// Prints what is there, and writes the configuration. Returns the exit code: kExitFailed if nothing
-// was found. Throws CommandError.
+// Prints what is there, and writes the configuration if `write` names one. Returns kExitOk. Throws
+// CommandError if no password can be had, `device` is not an address, a login does not say which of
+// several cameras it is for, or the configuration cannot be made (set_up_camera()). Without `write`
+// also if nothing was found.
 [[nodiscard]] int discover_cameras(const DiscoverOptions& options);
 
 }  // namespace alidade
