@@ -35,7 +35,7 @@ struct VideoMessage {
   enum class Kind : std::uint8_t { kFrame, kLost };
   Kind kind = Kind::kFrame;
   FrameStamp stamp;  // kFrame
-  ImageView image;   // kFrame; not valid() if nobody looks at images
+  ImageView image;   // kFrame; not valid() if images are not used
   ImageSlot slot = kNoImageSlot;
   double decoded_s = 0;  // s, host time at the push of the frame
   double time_s = 0;     // s, kLost: host time of the news
@@ -128,7 +128,7 @@ class RealtimeStage {
   // Requests the next frame's image.
   void want_image() { image_wanted_.store(true, std::memory_order_relaxed); }
   // The real-time thread adopts the calibration between two frames. The calibration must live until
-  // pop_adopted() returns it. False: too many wait already.
+  // pop_adopted() returns it. False: four wait already.
   bool publish(const PublishedCalibration* calibration);
   bool pop_adopted(const PublishedCalibration*& calibration) { return adopted_.pop(calibration); }
   void report(CalibrationReport report) { report_.store(report, std::memory_order_relaxed); }

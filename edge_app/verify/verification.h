@@ -22,9 +22,10 @@ namespace alidade {
 enum class Verdict {
   kHolds,         // no comparison contradicts the sigmas
   kContradicted,  // a comparison does, beyond chance
-  // Of claims: fewer than kReturnsLeast pairs or kLeastFreedom independent numbers. Of a departure:
-  // fewer pairs, nothing of it to be seen, or a test that would show only twenty times the claimed
-  // sigma. Of known directions: too few for the turn, or less than kLeastShare.
+  // A claim: there are fewer than kReturnsLeast pairs or kLeastFreedom independent numbers. A
+  // departure: there are fewer pairs, nothing of it can be seen, or the test would show only twenty
+  // times the claimed sigma. Known directions: there are too few for the turn, or
+  // KnownResult::share is less than kLeastShare.
   kNotJudged
 };
 
@@ -90,7 +91,8 @@ struct Verification {
 
 // A comparison with fewer independent numbers, or fewer than kReturnsLeast pairs, is not judged.
 inline constexpr double kLeastFreedom = 12;
-// Known directions are not judged if less of their covariance is claimed by frames and calibration.
+// Known directions are not judged if frames and calibration claim a smaller share of their
+// covariance.
 inline constexpr double kLeastShare = 0.1;
 
 [[nodiscard]] Verification verify(const VerifyInput& input);
