@@ -19,7 +19,7 @@ inline constexpr const char* kWsDiscoveryGroup6 = "ff02::c";
 struct ProbeMatch {
   std::string endpoint;  // "urn:uuid:...": the device, whatever its addresses; empty: not given
   std::vector<std::string> types;  // without prefixes: NetworkVideoTransmitter
-  // Of its scopes, decoded; empty: not given.
+  // From its scopes, decoded; empty: not given.
   std::string name;
   std::string hardware;
   std::vector<std::string> addresses;  // URLs of its service, http:// or https://, as reported

@@ -9,7 +9,7 @@
 
 namespace alidade {
 
-// A thread like those of NicedThreads that nobody waits for. False: the system cannot start it.
+// Starts a thread like those of NicedThreads that is not joined. False: the system cannot start it.
 [[nodiscard]] bool start_detached_niced(std::function<void()> run);
 
 class NicedThreads {

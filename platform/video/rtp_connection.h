@@ -43,7 +43,8 @@ struct AccessUnit {
 
 class RtpConnection {
  public:
-  // options.url must be without credentials. options and choice must outlive the connection.
+  // options.url must be without credentials. options and choice must outlive the connection, and
+  // options must not change.
   RtpConnection(const RtpSourceOptions& options, SenderChoice* choice);
   ~RtpConnection();
   RtpConnection(const RtpConnection&) = delete;
@@ -56,7 +57,7 @@ class RtpConnection {
   // Thread-safe. Ends a wait; all later waits end at once.
   void interrupt() { transport_->interrupt(); }
 
-  // Of the open connection.
+  // Codec parameters of the open connection.
   [[nodiscard]] const std::shared_ptr<const AVCodecParameters>& parameters() const {
     return parameters_;
   }
