@@ -1,8 +1,8 @@
 #pragma once
 // From a found camera to a configuration that `check` accepts: the text is made, read as `run`
 // would read it, both links are tried, and only then it is written. The password gets a file of its
-// own beside it that only its owner can read. Nothing is overwritten; after a failure nothing is
-// left.
+// own in the same folder, which only its owner can read. Nothing is overwritten; after a failure
+// nothing is left.
 
 #include <string>
 #include <vector>

@@ -9,15 +9,16 @@ namespace alidade {
 
 struct DiscoverOptions {
   std::string write;  // a configuration to write; empty: none
+  // device to keys: as in CameraSetupOptions.
   std::string device;
   std::string user;
   std::string password_file;
   std::string field_of_view;
   std::string head;
   std::vector<std::string> keys;
-  std::string interface;
+  std::string interface;  // to search on: "eth0"; empty: all but the loopback
   double duration_s = 4;  // of the search; 0: the network is not searched
-  bool untried = false;
+  bool untried = false;   // write without trying the links
   bool json = false;
 };
 

@@ -12,10 +12,10 @@
 // Images stay where the decoder put them: a frame occupies a slot of the capture thread, and the
 // last thread to use the image returns the slot. Each queue has one producer, one consumer, a fixed
 // capacity and fixed-size messages. A full queue drops the new message and counts it; no thread
-// waits for another. In OE mode a live frame that has waited for long while others wait behind it
-// loses its image: on a slow processor some records are telemetry's, but none is seconds late.
-// process() allocates nothing, takes no lock, logs nothing and throws nothing; the constructor has
-// touched all memory that it writes.
+// waits for another. In OE mode a live frame that has waited for more than 0.1 s while others wait
+// behind it loses its image: on a slow processor some records are telemetry's, but none is seconds
+// late. process() allocates nothing, takes no lock, logs nothing and throws nothing; the
+// constructor has touched all memory that it writes.
 
 #include <atomic>
 #include <boost/lockfree/spsc_queue.hpp>

@@ -54,7 +54,8 @@ struct MapContent {
 // CRC-32 of the parameters' values, which calibration.yaml preserves bit by bit.
 [[nodiscard]] std::uint32_t calibration_check(const Calibration& calibration);
 
-// Pure. False: one line in *error. name: of the file, in errors.
+// Pure. False: one line in *error. name: of the file, in errors. load_map() also refuses a file of
+// more than 256 MiB.
 [[nodiscard]] bool parse_map(const std::string& bytes, const std::string& name,
                              const Calibration& calibration, MapContent* content,
                              std::string* error);

@@ -8,8 +8,8 @@
 //   s = Z^T C^-1 r,   V = Z^T C^-1 Z,   s^T V^-1 s ~ chi-square if a is 0           (score test)
 // The noise of the pictures is measured: by the residuals, and by the scatter of the pairs' parts
 // of s. Departures are found one after the other, the least probable first, until none is
-// improbable; of these the ones are kept that explain most for their number.
-// rad, s, px. Allocates.
+// improbable or four are found; of these the ones are kept that explain most for their number. rad,
+// s, px. Allocates.
 
 #include <array>
 #include <optional>

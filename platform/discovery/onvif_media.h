@@ -29,12 +29,12 @@ constexpr OnvifCall kGetStreamUri2{kOnvifMedia2, "GetStreamUri"};
 // The address of the service media2 in the answer to GetServices; empty: it has none.
 [[nodiscard]] std::string parse_onvif_media2(std::string_view body);
 
-// The streams of the profiles that have video, from the answer of media or media2, without their
-// URLs.
+// The streams of the profiles that have video, 64 at most, from the answer of media or media2,
+// without their URLs. A stream whose token exceeds 200 bytes is left out.
 [[nodiscard]] bool parse_onvif_streams(std::string_view body, std::vector<VideoStream>* streams,
                                        std::string* error);
 
-// The stream's URL as the device reports it.
+// The stream's URL as the device reports it, 2000 bytes at most.
 [[nodiscard]] bool parse_onvif_stream_url(std::string_view body, std::string* url,
                                           std::string* error);
 

@@ -4,9 +4,9 @@
 // over one persistent HTTP connection with digest authentication (one 401 in total, not one per
 // poll), or basic where it is permitted and the only method offered (link_rules.h). Pace, stamps
 // and threads: http_polling_source.h. kDisconnected and kFailed: as there. kDisconnected also after
-// an HTTP status other than 200, an `Error:` answer, and an answer without a valid position.
-// kFailed also for a URL with a path and, before the first sample, for a wrong user or password
-// (401).
+// an answer of more than 4096 bytes, an HTTP status other than 200, an `Error:` answer, and an
+// answer without a valid position. kFailed also for a URL with a path and, before the first sample,
+// for a wrong user or password (401).
 
 #include <memory>
 #include <string>

@@ -51,6 +51,7 @@ class RtpConnection {
   RtpConnection& operator=(const RtpConnection&) = delete;
 
   // kOk, kStopped, or kDisconnected or kFailed with *error: one line without URL and password.
+  // read() only after open() returned kOk.
   [[nodiscard]] ReadStatus open(std::string* error);
   [[nodiscard]] ReadStatus read(AccessUnit* unit, std::string* error);
 
