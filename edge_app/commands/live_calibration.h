@@ -28,8 +28,8 @@ struct StartingCalibration {
 };
 
 // path: of the configuration, for errors. use: kLook changes no file and takes no lock. Throws
-// CommandError if there is nothing to begin with, a file cannot be used, or, with kKeep, another
-// process calibrates into the same file.
+// CommandError if there is nothing to begin with, a file cannot be used, or, with kKeep and
+// calibration.auto, another process calibrates into the same file.
 [[nodiscard]] StartingCalibration load_starting_calibration(const Config& config,
                                                             const std::string& path,
                                                             CalibrationStore::Use use);
