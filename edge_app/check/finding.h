@@ -2,7 +2,7 @@
 // A finding of a check: something to do about a link. (Measured numbers go to the report instead.)
 //   problem  run would refuse, stop, or answer wrongly or much worse than it could: exit code 1
 //   advice   works, and could work better
-// One line: what is wrong, where, what would be right. Each rule stands, with its reason, beside
+// One line: what is wrong, where, what would be right. Each rule and its reason are written next to
 // the code that applies it.
 
 #include <string>

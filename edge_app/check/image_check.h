@@ -23,7 +23,7 @@
 
 namespace alidade {
 
-// By how much the scene at the image's centre moved between two frames, by their numbers.
+// How far the scene at the image's centre moved between two frames. from, to: the frames' numbers.
 struct ImageShift {
   std::int64_t from = 0;
   std::int64_t to = 0;
@@ -57,7 +57,8 @@ struct ImageReport {
 
 class ImageCheck {
  public:
-  // frame: its number. connected: as far as known, no frame is missing since the one before.
+  // frame: its number. image: if it is not valid(), the frame counts as one without an image.
+  // connected: as far as known, no frame is missing since the one before.
   void add(std::int64_t frame, const ImageView& image, bool connected);
 
   [[nodiscard]] ImageReport report(const ImageNeeds& needs) const;

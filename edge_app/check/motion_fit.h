@@ -29,10 +29,10 @@ struct TimedShift {
 class HeadPath {
  public:
   explicit HeadPath(const std::vector<PanTiltSample>& samples);
-  // Pan and tilt, interpolated, rad. False: there are no two samples close enough around the time.
+  // Pan and tilt, interpolated, rad. False: no two samples, at most 0.5 s apart, enclose the time.
   [[nodiscard]] bool at(double time_s, Vector2<double>* angle) const;
   [[nodiscard]] std::size_t samples() const { return times_.size(); }
-  // rad, the larger of the two axes' ranges. Needs a sample.
+  // rad, the larger of the two axes' ranges; 0 without samples.
   [[nodiscard]] double range() const;
 
  private:
@@ -64,19 +64,20 @@ struct MotionFit {
 
 // part / whole; 0 if whole is 0.
 [[nodiscard]] double share(double part, double whole);
-// The share of the image's motion that is explained if the axes have these signs. 0: either sign,
-// whichever fits.
+// The share of the image's motion that is explained if the axes have these signs. 0: the sign that
+// fits.
 [[nodiscard]] double explained(const MotionFit& fit, const std::array<int, 2>& signs);
 // The same with each axis of the image against the other axis of the head, as for an image turned
 // by 90 degrees.
 [[nodiscard]] double crossed(const MotionFit& fit);
 
-// Fits at clock offsets around a given one: a second to both sides, then twice as far each time, as
-// long as no offset explains the motion well or the best one lies at an end. calibrate() widens its
-// search only if the best offset lies at an end.
+// Fits at clock offsets around a given one, in steps of 10 ms. The range is one second to both
+// sides at first. It is doubled until an offset that is not at an end explains 0.9 of the motion,
+// or until a larger range adds no offset. calibrate() widens its search only if the best offset
+// lies at an end.
 struct MotionSearch {
-  // Leaves out offsets that cover less than half of the motions, or fewer than least_times
-  // baselines without overlap.
+  // Leaves out offsets at which the head's path covers less than half of the motions, or fewer than
+  // least_times baselines without overlap. `offsets` and `fits` are empty if no offset is left.
   MotionSearch(const std::vector<TimedShift>& motions, const HeadPath& head, double around_s,
                double least_times);
 
@@ -85,7 +86,7 @@ struct MotionSearch {
   // The motion is explained well, by an offset that is not at an end of the search.
   bool sure = false;
 
-  // Index of the best fit; the first of equals.
+  // Index of the best fit; the first of equals. `fits` must not be empty.
   template <typename Score>
   [[nodiscard]] std::size_t best(const Score& score) const {
     std::size_t at = 0;

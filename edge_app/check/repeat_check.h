@@ -29,7 +29,8 @@ struct RepeatReport {
   Findings findings;
 };
 
-// time_s: of each frame (VideoReport). samples: in order of time, without stale repeats.
+// time_s: one for each frame (VideoReport::time_s). samples: in order of time, without stale
+// repeats.
 [[nodiscard]] RepeatReport check_repeats(const std::vector<CheckedFrame>& frames,
                                          const std::vector<double>& time_s,
                                          const std::vector<PanTiltSample>& samples,

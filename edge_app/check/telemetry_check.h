@@ -79,7 +79,7 @@ struct TelemetryReport {
   Findings findings;
 };
 
-// delivered_s: when each sample came from its source, on the clock of the sample times.
+// delivered_s: one for each sample: when it came from its source, on the clock of the sample times.
 [[nodiscard]] TelemetryReport check_telemetry(const std::vector<PanTiltSample>& samples,
                                               const std::vector<double>& delivered_s,
                                               const ClockFilterOptions& clock,

@@ -15,14 +15,14 @@ namespace alidade {
 [[nodiscard]] AxisReport measure_axis(const std::vector<PanTiltSample>& samples,
                                       double PanTiltSample::*angle);
 
-// Sets turning, stale and how long repeats lasted; from eight new values while the head turned on,
-// also change_hz and the top rates. samples: finite, in order of time. stale:
+// Sets `turning`, `stale` and how long repeats lasted. If eight new values or more came while the
+// head turned, also sets change_hz and the top rates. samples: finite, in order of time. stale:
 // find_stale_repeats(samples). Needs the axes' resolutions in *report.
 void measure_turning(const std::vector<PanTiltSample>& samples, const std::vector<bool>& stale,
                      TelemetryReport* report);
 
 // s: how old the newest known angle was just before each sample was delivered, as the real-time
-// step knows it.
+// step knows it. delivered_s: one for each sample.
 [[nodiscard]] std::optional<Spread> ages_of(const std::vector<PanTiltSample>& samples,
                                             const std::vector<double>& delivered_s,
                                             const TelemetryNeeds& needs);

@@ -31,12 +31,13 @@ struct FrameTime {
   ClockEstimate clock;
   bool known = true;   // false: clock.time_s may be late by any amount
   bool of_use = true;  // false: of no use for calibration, and later frames do not improve it
-  // Sum of the steps of the least delay. The receive time contains this sum, the line does not.
+  // s, sum of the steps of the least delay. The receive time contains this sum, the line does not.
   double delay_shift_s = 0;
-  // By how much frames leave the line. Included in clock.sigma_s; common to neighbouring frames.
+  // s, how far frames lie off the clock's line. Included in clock.sigma_s. Neighbouring frames
+  // share this error.
   double off_line_s = 0;
-  double wander_s = 0;  // the same if frames leave the line again and again, else 0
-  // At a restart or step of the clock: by how much the new line may differ from the old one. The
+  double wander_s = 0;  // s, the same if frames leave the line again and again, else 0
+  // s, at a restart or step of the clock: how much the new line may differ from the old one. The
   // cause may be the delay or the stamps.
   double moved_s = 0;
   bool stamps_left_out = false;                 // the sender's stamps are not used: wrong rate
@@ -79,7 +80,8 @@ class FrameClock {
   static constexpr int kManyStrays = 25;
   static constexpr double kStoodStill_s = 0.5;  // half of the window in which the pace is shown
   static constexpr double kGate = 6;  // sigmas of the line: items below it have come down to it
-  static constexpr double kOpen = 3;  // sigmas that the line itself leaves open
+  // sigmas of the line: a smaller deviation may be the line's own error
+  static constexpr double kOpen = 3;
 
   FrameTime judge(const FrameStamp& stamp) {
     if (!wait_for_pace_) return {ask_clock(stamp, stamp.restarted)};
@@ -298,8 +300,8 @@ class FrameClock {
     if (pace_.shown(kStoodStill_s)) *time = begin_again(stamp);
   }
 
-  // A backlog arrives at once and is worked off. Until then it says nothing of the delay. If the
-  // delay was seen to wander before, lateness counts as wander instead.
+  // A backlog arrives at once and is worked off. Until then it shows nothing about the delay. If
+  // the delay was seen to wander before, lateness counts as wander instead.
   void watch_wander(double receive_s, double late_s, double sigma_s) {
     const double gate_s = std::max(least_step_s_, kGate * sigma_s);
     if (late_s > ArrivalPace::kBacklog_s && wander_.off_s() < ArrivalPace::kBacklog_s / 2) {

@@ -1,7 +1,7 @@
 #pragma once
 // begins_fresh(): whether the first frames of a recording arrived without a long wait. The later
-// frames of the recording show it; in a live stream nobody knows (frame_clock.h). Seconds. Pure;
-// allocates.
+// frames of the recording show it. In a live stream these have not come yet (frame_clock.h).
+// Seconds. Pure; allocates.
 
 #include <algorithm>
 #include <cstddef>

@@ -137,7 +137,7 @@ class ReceiptClock {
     period_sigma_s_ = std::sqrt(12.0) * stamp_sigma_s_ / (items * std::sqrt(items));
   }
 
-  // Of arrival over count, by least squares.
+  // Slope of arrival over count since index `from`, by least squares.
   [[nodiscard]] double slope_since(std::size_t from) const {
     const double n = double_of(arrivals_.size() - from);
     const double middle = (n - 1) / 2;

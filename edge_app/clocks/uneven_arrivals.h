@@ -56,7 +56,8 @@ class UnevenArrivals {
   }
 
  private:
-  // Of the usual interval: the picture had waited behind another.
+  // A shorter interval, in units of the usual one, means that the picture had waited behind
+  // another.
   static constexpr double kShort = 0.6;
   static constexpr double kLearn = 0.005;
 

@@ -40,8 +40,8 @@ class UtcLine {
     seen_s_ = stamp.receive_time_s;
   }
 
-  // The connection has ended. filter: has its line; null if no line is to be believed. off_line_s:
-  // by how much frames left the line.
+  // The connection has ended. filter: the filter with its line; null if no line is to be believed.
+  // off_line_s: s, how far frames lay off the line.
   void end_connection(const ClockFilter<>* filter, double off_line_s) {
     if (filter != nullptr && filter->state() == ClockState::kLocked && steady_since_s_ &&
         seen_s_ - *steady_since_s_ >= kProven_s) {

@@ -29,8 +29,10 @@ struct CalibrateOptions {
   std::vector<double> scene_distance_m;      // nearest and farthest; empty: nothing is known
 };
 
-// Calibrates from one recording, or from all of them together if they differ in zoom. Returns the
-// exit code; throws CommandError.
+// Calibrates from one recording, or from all of them together if they differ in zoom.
+// options.recordings must not be empty. Returns kExitOk. Throws CommandError if an option or a
+// recording cannot be used, another process is writing the same calibration, the calibration fails,
+// a result cannot be written, or SIGINT or SIGTERM comes.
 [[nodiscard]] int calibrate_recordings(const CalibrateOptions& options);
 
 }  // namespace alidade

@@ -12,12 +12,15 @@ struct CalibrateShutterOptions {
   std::string config;                // in place of `video`: configuration of a live video
   std::optional<double> duration_s;  // s, at most; for a live video
   std::string pattern;               // named as in known_pattern.h
-  std::string directory;  // empty: <recording>/alidade, or alidade beside the file; live: alidade
-  std::string paper;      // --print: only draw the pattern for this paper
+  // empty: <recording>/alidade, or alidade in the file's folder; live: alidade
+  std::string directory;
+  std::string paper;  // --print: only draw the pattern for this paper
   bool json = false;
 };
 
-// Returns the exit code; throws CommandError.
+// Returns kExitOk. Throws CommandError if an option is wrong, the video cannot be used, another
+// process is writing the same lens.yaml, the calibration fails, a result cannot be written, or a
+// signal ends the search in a recording or file.
 [[nodiscard]] int calibrate_shutter(const CalibrateShutterOptions& options);
 
 }  // namespace alidade

@@ -12,8 +12,10 @@
 
 namespace alidade {
 
-// Writes calibration.yaml with the curve, its report, and a report for each dwell. A dwell that cannot be
-// calibrated is left out with a warning. Returns the exit code; throws CommandError.
+// Writes calibration.yaml with the curve, its report, and a report for each dwell. A dwell that
+// cannot be calibrated is left out with a warning. jobs: two or more. Returns kExitOk. Throws
+// CommandError if an option holds at one zoom only, a job has no zoom reading, the dwells that are
+// left make no curve, a result cannot be written, or SIGINT or SIGTERM comes.
 [[nodiscard]] int calibrate_zooms(const CalibrateOptions& options, std::vector<CalibrationJob> jobs,
                                   StopSignals* signals);
 

@@ -34,11 +34,13 @@ struct CalibrationJob {
 };
 
 // One job for the whole recording; if its zoom moves, one job for each dwell. A dwell is a time of
-// at least kZoomRestLeast_s in which the reading stands still. Frames within kZoomMargin_s of either
-// end of a dwell are left out, as the offset between the clocks of image and telemetry is not known
-// yet. The options hold what the recording states of its time stamps and scales. zoom_tolerance:
-// device units; readings that differ by no more are one zoom; empty: found from their jitter.
-// Throws CommandError.
+// at least kZoomRestLeast_s in which the reading stands still. Frames within kZoomMargin_s of the
+// beginning or the end of a dwell are left out, as the offset between the clocks of image and
+// telemetry is not known yet. The options hold what the recording states of its time stamps and
+// scales. zoom_tolerance: device units; readings that differ by no more are one zoom; empty: found
+// from their jitter. Throws CommandError if a file that a calibration needs is missing or cannot be
+// read, more than a tenth of the tracked points lie outside the image, or the zoom moves and no
+// dwell is long enough.
 inline constexpr double kZoomMargin_s = 1;
 [[nodiscard]] std::vector<CalibrationJob> load_calibration_jobs(
     const std::string& directory, std::optional<double> zoom_tolerance = std::nullopt);

@@ -21,10 +21,14 @@ struct CameraSearchOptions {
   bool try_telemetry = true;
 };
 
-// Blocks: the duration of the search, and some seconds for the questions.
+// Blocks for the duration of the search, then for the questions: some seconds for each 16 cameras,
+// which are asked at the same time. Throws CommandError if options.device is neither a file nor an
+// address.
 [[nodiscard]] CameraFindings find_cameras(const CameraSearchOptions& options);
 
-// The one that is meant; null: none. Without a name the only camera of the network.
+// The camera that `device` names, borrowed from `findings`; null: there is none. If `device` is
+// empty, find_camera() gives the only camera of the network; null if there are none or several.
+// find_camera() throws CommandError if `device` is neither a file nor an address.
 [[nodiscard]] const FoundCamera* find_camera(const CameraFindings& findings,
                                              const std::string& device);
 [[nodiscard]] const VideoDevice* find_video_device(const CameraFindings& findings,
@@ -35,7 +39,8 @@ struct CameraSearchOptions {
                                                         const DeviceReport& report,
                                                         const DeviceLogin& login);
 
-// The url of pan_tilt for this device service: without the usual path.
+// The url of pan_tilt for this device service: without the usual port and path. A text that is not
+// a URL is returned unchanged.
 [[nodiscard]] std::string onvif_url_for_config(const std::string& url);
 
 }  // namespace alidade

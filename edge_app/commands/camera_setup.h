@@ -1,8 +1,8 @@
 #pragma once
 // From a found camera to a configuration that `check` accepts: the text is made, read as `run`
 // would read it, both links are tried, and only then it is written. The password gets a file of its
-// own beside it that only its owner can read. Nothing is overwritten; after a failure nothing is
-// left.
+// own in the same folder, which only its owner can read. Nothing is overwritten; after a failure
+// nothing is left.
 
 #include <string>
 #include <vector>
@@ -29,7 +29,9 @@ struct CameraSetupResult {
   std::vector<std::string> remarks;  // one line each
 };
 
-// Throws CommandError, its line naming what is missing.
+// Throws CommandError if a file exists already, the camera cannot be used, a value is missing or
+// wrong, a link that is tried delivers nothing, or a file cannot be written. The error's line names
+// it.
 [[nodiscard]] CameraSetupResult set_up_camera(const CameraFindings& findings,
                                               const CameraSetupOptions& options);
 

@@ -14,7 +14,8 @@ struct CheckOptions {
 };
 
 // Checks the configuration and what its links send. Returns the exit code: kExitFailed if a finding
-// is a problem. Throws CommandError.
+// is a problem. Throws CommandError if nothing can be measured: the configuration, or a
+// calibration, plane, lens.yaml or network that it names, cannot be used.
 [[nodiscard]] int check_links(const CheckOptions& options);
 
 }  // namespace alidade

@@ -27,23 +27,27 @@ struct CommandError : std::runtime_error {
 };
 
 // Loads the configuration and logs its warnings. For a recording, video.width and video.height
-// become the recording's, if it can be read. Throws CommandError.
+// become the recording's, if it can be read. Throws CommandError if the file cannot be read or is
+// not a valid configuration.
 Config require_config(const std::string& path);
 
-// Section `video` of a configuration that needs no other (ConfigScope::kVideo); throws
-// CommandError.
+// Section `video` of a configuration that needs no other section (ConfigScope::kVideo). Throws
+// CommandError if the file cannot be read or is not such a configuration.
 VideoConfig require_video_config(const std::string& path);
 
-// The calibration in a file, with its zoom curve, without a map. Throws CommandError.
+// The calibration in a file, with its zoom curve, without a map. Throws CommandError if the file
+// cannot be read or is not a calibration.
 PublishedCalibration require_calibration_file(const std::string& path);
 
 // The calibration of calibration.file. The data sheet's if no file is named, or if the file does
-// not exist yet, calibration.auto is set and camera.focal_length_px is given; the image size is
-// then that of section `video`. Throws CommandError if the file cannot be used, or if it is for
-// another image size than section `video` states for a live video.
+// not exist yet, calibration.auto is set and camera.focal_length_px is given. The image size is
+// then that of section `video`. If no file is named, camera.focal_length_px must be set, as
+// parse_config() demands. Throws CommandError if the file cannot be used, or if it is for another
+// image size than section `video` states for a live video.
 PublishedCalibration choose_calibration(const Config& config);
 
-// The ground plane that the configuration names; null if it names none. Throws CommandError.
+// The ground plane that the configuration names; null if it names none. Throws CommandError if its
+// file cannot be read or is not a plane.
 std::shared_ptr<const PlaneEstimate> require_plane(const Config& config);
 
 // A camera that is known only from its data sheet, with nominal axes and a clock offset of 0.

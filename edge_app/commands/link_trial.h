@@ -8,7 +8,9 @@
 
 namespace alidade {
 
-// Wait until the first item comes or the link fails. False: *error is one line for the user.
+// Both wait until the first item comes, the link fails for good or is lost twice, or the wait is
+// over: config.timeout_s + kConnectSlack_s, for a picture 10 s more, for a key frame. False: *error
+// is one line for the user.
 [[nodiscard]] bool first_sample(const PanTiltConfig& config, PanTiltSample* sample,
                                 std::string* error);
 // Sets the size of the picture that really comes. The picture is decoded.

@@ -27,8 +27,9 @@ struct StartingCalibration {
   PublishedCalibration calibration;  // with the stored map
 };
 
-// path: of the configuration, for errors. use: kLook changes no file. Throws CommandError if there
-// is nothing to begin with.
+// path: of the configuration, for errors. use: kLook changes no file and takes no lock. Throws
+// CommandError if there is nothing to begin with, a file cannot be used, or, with kKeep and
+// calibration.auto, another process calibrates into the same file.
 [[nodiscard]] StartingCalibration load_starting_calibration(const Config& config,
                                                             const std::string& path,
                                                             CalibrationStore::Use use);

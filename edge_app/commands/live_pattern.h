@@ -19,8 +19,12 @@ namespace alidade {
 // A longer film would take minutes and gigabytes of memory to calibrate.
 inline constexpr double kLongestFilm_s = 300;
 
-// config: of a live video. Throws CommandError if no image came, an image has another size than the
-// configured one, or the link failed for good.
+// config: of a live video. Throws CommandError if no image came, or fewer than three were searched.
+// Before the pattern was found once, it is also thrown if the link fails for good, or an image has
+// another size than the configured one or those before, or is too small for a pattern. Later such
+// an event ends the film, and what was filmed before is used. The first image must come within
+// config.timeout_s + kConnectSlack_s. This time does not run while the source says what it waits
+// for.
 [[nodiscard]] PatternVideo film_pattern(const VideoConfig& config, const KnownPattern& pattern,
                                         double duration_s);
 

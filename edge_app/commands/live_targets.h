@@ -13,7 +13,8 @@
 
 namespace alidade {
 
-// Null if no network is configured. Throws CommandError if the network's files cannot be used.
+// Null if no network is configured. Throws CommandError if the network's files cannot be used. A
+// model may have 1 GiB at most.
 [[nodiscard]] std::unique_ptr<NetworkDetector> load_network(
     const std::optional<NetworkFiles>& files);
 
@@ -29,7 +30,7 @@ class LiveTargets {
   [[nodiscard]] DetectorTap* detector_tap() { return tap_ ? &*tap_ : nullptr; }
   // Only if detector_tap() is not null.
   [[nodiscard]] DetectorsReport detectors() const;
-  // Starts the detectors' thread, if there is one.
+  // Starts the feed's thread. Throws CommandError if the system cannot start it.
   void start();
   // To be called while the objects that new lines wake still exist.
   void stop();
@@ -43,7 +44,8 @@ class LiveTargets {
   std::optional<DetectorTap> tap_;
 };
 
-// Null if nothing is tracked.
+// Null if nothing is tracked: there is no section `tracking`, or neither HTTP nor a built-in
+// detector delivers detections. Throws as the constructor does.
 [[nodiscard]] std::unique_ptr<LiveTargets> make_live_targets(
     const Config& config, const std::shared_ptr<const PlaneEstimate>& plane);
 

@@ -14,10 +14,12 @@ struct LocalizeCommand {
   // the zoom reading gives no focal length.
   std::string calibration;
   bool no_telemetry = false;
-  int every = 1;  // use each n-th frame of a recording
+  int every = 1;  // use each n-th frame of a recording; 1 or more
 };
 
-// Returns the exit code; throws CommandError.
+// Returns kExitOk, also for pictures that are not found. Throws CommandError if the map, a picture,
+// a recording or the calibration cannot be used, a picture has another size than the map's, or
+// stdout cannot be written.
 [[nodiscard]] int localize_pictures(const LocalizeCommand& options);
 
 }  // namespace alidade

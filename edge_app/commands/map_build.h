@@ -19,7 +19,9 @@ struct MapBuildCommand {
   bool json = false;
 };
 
-// Returns the exit code; throws CommandError.
+// options.recordings must not be empty. Returns kExitOk. Throws CommandError if an option, a
+// recording, the calibration or the map to add cannot be used, the recordings differ in image size,
+// another process is writing the same map, the pictures make no map, or it cannot be written.
 [[nodiscard]] int build_map(const MapBuildCommand& options);
 
 }  // namespace alidade

@@ -13,8 +13,8 @@ struct MapExportCommand {
   int panorama_width = 4096;  // px, > 0; the panorama is not wider
 };
 
-// Returns kExitOk. Throws CommandError if the map cannot be read or has no keyframes, or if a file
-// cannot be written.
+// Returns kExitOk. Throws CommandError if the map cannot be read or has no keyframes, libav has no
+// PNG encoder, or a file cannot be written.
 [[nodiscard]] int export_map(const MapExportCommand& options);
 
 }  // namespace alidade

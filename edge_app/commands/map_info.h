@@ -10,7 +10,9 @@ struct MapInfoCommand {
   bool json = false;
 };
 
-// Return the exit code; throw CommandError.
+// Both return kExitOk, and throw CommandError if the map cannot be read or stdout cannot be
+// written. check_map() also throws it if the map contradicts itself: a residual (map_residual_px())
+// of 1 % of the image's width or more.
 [[nodiscard]] int show_map(const MapInfoCommand& options);
 [[nodiscard]] int check_map(const MapInfoCommand& options);
 

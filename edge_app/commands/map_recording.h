@@ -29,7 +29,8 @@ class FocalLengthKnowledge {
   explicit FocalLengthKnowledge(double px);
   FocalLengthKnowledge(double wide_px, double tele_px, double wide_reading, double tele_reading);
 
-  // zoom: the reading, device units. Empty: not known, or a reading is needed and missing.
+  // zoom: the reading, device units. Empty: not known, or a reading is needed and missing or
+  // outside the curve.
   [[nodiscard]] std::optional<FocalLengthPrior> at(const std::optional<double>& zoom) const;
   [[nodiscard]] bool needs_reading() const { return needs_reading_; }
 
@@ -69,12 +70,13 @@ struct MapRecording {
 [[nodiscard]] MapView map_view(const MapRecording& recording, const FrameStamp& frame,
                                const Calibration* calibration, const FocalLengthKnowledge& known);
 
-// How far the motion in `view`, a frame's, may be wrong over that frame's read-out: turn =
-// read-out time x (largest difference between view's rates and those of the telemetry around the
-// frame + 2 % of the largest of these rates); log f likewise. "Around" is within 0.05 s with a
-// calibration, within 1 s without, as the clock offset is then not known. line_delay: s/row; 0: not
-// known; the result is then the largest rate x 30 ms. kUnknownMotion: too little telemetry there.
-// log_f stays infinite if a sample there has no zoom reading or the reading no f.
+// How far the motion in `view` may be wrong over the frame's read-out. view: the result of
+// map_view() for this frame. turn = read-out time x (largest difference between view's rates and
+// those of the telemetry around the frame + 2 % of the largest of these rates); log f likewise.
+// "Around" is within 0.05 s with a calibration, within 1 s without, as the clock offset is then not
+// known. line_delay: s/row; 0: not known; the result is then the largest rate x 30 ms.
+// kUnknownMotion: too little telemetry there. log_f stays infinite if a sample there has no zoom
+// reading or the reading no f.
 [[nodiscard]] MotionDoubt motion_doubt(const MapRecording& recording, const FrameStamp& frame,
                                        const Calibration* calibration,
                                        const FocalLengthKnowledge& known, const MapView& view,
@@ -82,7 +84,7 @@ struct MapRecording {
 
 // Calls use(index, image) for the pictures of these frames. frames: increasing indices into
 // recording.frames; use gets one of them. A frame without a picture is skipped. The image is lent
-// for the call. Throws CommandError.
+// for the call. Throws CommandError if the pictures cannot be read on.
 void for_each_picture(const MapRecording& recording, const std::vector<std::size_t>& frames,
                       const std::function<void(std::size_t, const ImageView&)>& use);
 

@@ -18,9 +18,9 @@ namespace alidade {
 // A lock on an output file, held while a command works. Another command that would write the file
 // fails and names the holder. A `run` that stores its calibrations in the same file holds the same
 // lock. The constructor makes the file's folder. Nothing of the lock stays behind, not even if
-// SIGINT, SIGTERM or SIGHUP ends the program; nor does a folder that it made and that is still
-// empty. Where no lock can be taken (file system without locks, folder not writable), none is.
-// Only one object may exist at a time.
+// SIGINT, SIGTERM or SIGHUP ends the program; a folder that it made and that is still empty does
+// not stay, either. Where no lock can be taken (file system without locks, folder not writable),
+// none is. Only one object may exist at a time.
 class OutputLock {
  public:
   // Throws CommandError if the file is in use.
@@ -38,11 +38,11 @@ class OutputLock {
 
 class OutputDirectory {
  public:
-  // The arguments of output_path(). Throws CommandError.
+  // The arguments of output_path(). Throws CommandError if the directory cannot be made.
   OutputDirectory(const std::string& given, const std::string& recording);
 
   // Writes a file of this name in the directory and remembers it under `kind`. write(path, &error)
-  // returns whether it succeeded. Throws CommandError.
+  // returns whether it succeeded. Throws CommandError if the file cannot be written.
   using Write = std::function<bool(const std::string&, std::string*)>;
   void add(const char* kind, const char* name, const Write& write);
   void add(const char* kind, const char* name, const std::string& text);

@@ -21,7 +21,7 @@ class PartialFile {
   // The final name.
   [[nodiscard]] const std::string& path() const { return path_; }
   // Closes the file and renames it; a file of the final name is replaced. Does not wait until the
-  // data are on the disk. To be called once. Throws CommandError if the file cannot be renamed.
+  // data is on the disk. To be called once. Throws CommandError if the file cannot be renamed.
   void complete();
 
  private:

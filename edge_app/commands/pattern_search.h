@@ -1,8 +1,8 @@
 #pragma once
 // PatternSearch: turns the frames of a video into a PatternVideo: the points of the pattern in each
 // image, on a steady clock. Images that repeat the one before are left out. Lost frames are
-// noticed. Jittering time stamps are corrected (fit_clock_line), for each connection by itself:
-// how long the gap between two connections was is not known.
+// noticed. Jittering time stamps are corrected (fit_clock_line). Each connection is corrected by
+// itself, as the length of the gap between two connections is not known.
 //
 // The time stamps of all frames go into the clock, also those of images that were not searched.
 // note() and look() share no state, so one thread may read while another searches.
@@ -23,7 +23,7 @@ namespace alidade {
 struct PatternVideo {
   std::string name;  // of the video, for messages
   PatternData data;
-  int images = 0;                    // that were searched or repeated
+  int images = 0;                    // searched, or equal to the image before
   int repeated = 0;                  // of these, the ones equal to the image before
   int skipped = 0;                   // came while another one was searched
   int found = 0;                     // images with the pattern
@@ -38,7 +38,8 @@ class PatternSearch {
   PatternSearch(std::string name, const KnownPattern& pattern);
 
   // Must be called for every frame, in order. True: its image should be searched. Throws
-  // CommandError if an image is too small or has another size than those before.
+  // CommandError if an image is too small (PatternDetector::kLeastImage_px) or has another size
+  // than those before.
   [[nodiscard]] bool note(const Frame& frame);
 
   // Searches a frame. Frames must have been noted and come in the same order; some may be left out.
@@ -52,8 +53,8 @@ class PatternSearch {
   // known.
   [[nodiscard]] std::string doubt() const { return detector_.doubt(); }
 
-  // Ends the search: no call may follow. Throws CommandError if there are too few images, or if the
-  // time stamps do not increase.
+  // Ends the search: no call may follow. Throws CommandError if fewer than three images were
+  // searched, or if the time stamps do not increase.
   [[nodiscard]] PatternVideo finish();
 
  private:

@@ -13,7 +13,8 @@ struct PlaneOptions {
   bool json = false;
 };
 
-// Returns the exit code; throws CommandError.
+// Returns kExitOk. Throws CommandError if the data cannot be read, no plane or no heading follows
+// from it, the result would overwrite the data, or a file or stdout cannot be written.
 [[nodiscard]] int fit_plane_command(const PlaneOptions& options);
 
 // The same for a client of `run`, POST /api/v1/plane/fit. body: the data as JSON. *answer: the fit

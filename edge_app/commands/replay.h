@@ -20,7 +20,9 @@ struct ReplayOptions {
   bool csv = false;
 };
 
-// Runs the real-time step over a recording. Returns the exit code; throws CommandError.
+// Runs the real-time step over a recording. Returns kExitOk. Throws CommandError if an option, the
+// recording or the calibration cannot be used, a result cannot be written, or SIGINT or SIGTERM
+// comes: then nothing is stored.
 [[nodiscard]] int replay_recording(const ReplayOptions& options);
 
 }  // namespace alidade

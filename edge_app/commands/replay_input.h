@@ -16,7 +16,8 @@
 
 namespace alidade {
 
-// calibration: a file; empty: <recording>/alidade/calibration.yaml. Throws CommandError.
+// calibration: a file; empty: <recording>/alidade/calibration.yaml. Throws CommandError if the file
+// does not exist, cannot be read or is not a calibration.
 [[nodiscard]] PublishedCalibration find_calibration(const std::string& recording,
                                                     const std::string& calibration);
 
@@ -25,7 +26,8 @@ namespace alidade {
                                      const PublishedCalibration& calibration,
                                      const std::string& recording);
 
-// The next item of a recording; empty at its end. Throws CommandError.
+// The next item of a recording; empty at its end. Throws CommandError if the recording cannot be
+// read on.
 template <typename Item, typename Source>
 std::optional<Item> next_of(Source& source) {
   Item item;

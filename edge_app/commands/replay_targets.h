@@ -27,7 +27,10 @@ class ReplayTargets {
  public:
   // detections: a file, or "-" for stdin. tracking: a configuration with section `tracking`; empty:
   // on the sphere, with defaults. path: of the result, which gets its name in complete(). signals:
-  // borrowed. All public functions throw CommandError.
+  // must outlive this object. A line may have kMaxDetectionBytes at most. The constructor throws
+  // CommandError if the configuration cannot be used, `detections` cannot be read or the result
+  // cannot be written; the other functions throw it if a line cannot be read, the result cannot be
+  // written, or a signal comes while they wait for a line.
   ReplayTargets(const std::string& detections, const std::string& tracking, std::string path,
                 StopSignals* signals);
 

@@ -1,6 +1,6 @@
 #pragma once
-// What `alidade run` reports beside its records: the last lines of its log, and its state to a
-// service manager. `replay` has the first of these lines, too.
+// What `alidade run` reports in addition to its records: the last lines of its log, and its state
+// to a service manager. `replay` has the first of these lines, too.
 
 #include <string>
 

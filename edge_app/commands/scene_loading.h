@@ -19,7 +19,7 @@ namespace alidade {
                               SceneMapFile* file, SceneMap* map, std::string* error);
 
 // Null if no map is configured, the mode is PT, or the map cannot be used. Records are then in
-// telemetry's base. If there is no telemetry, a map that cannot be used throws CommandError.
+// telemetry's base. Throws CommandError if there is no telemetry and the map cannot be used.
 [[nodiscard]] std::unique_ptr<SceneLocalization> load_scene(
     const Config& config, const PublishedCalibration& calibration);
 

@@ -1,6 +1,6 @@
 #pragma once
-// `alidade setup`: `alidade discover` as a page in the browser. Serves 127.0.0.1 only, and only who
-// has the address with its token, as others may be logged in at this machine.
+// `alidade setup`: `alidade discover` as a page in the browser. Serves 127.0.0.1 only. All but the
+// page itself needs the token in the printed address, as others may be logged in at this machine.
 
 #include <string>
 
@@ -11,7 +11,8 @@ struct SetupOptions {
   int port = 8099;  // 0: any free one
 };
 
-// Serves until a signal. Returns the exit code; throws CommandError.
+// Serves until SIGINT or SIGTERM. Returns kExitOk. Throws CommandError if the configuration to
+// write exists already, or if the server cannot be started.
 [[nodiscard]] int set_up_in_browser(const SetupOptions& options);
 
 }  // namespace alidade

@@ -15,8 +15,9 @@ class StopSignals {
   StopSignals& operator=(const StopSignals&) = delete;
 
   enum class Event { kSignal, kDescriptor, kTimeout };
-  // Waits for a signal, for `descriptor` to become readable, or for timeout_s to pass (infinity:
-  // for ever).
+  // Waits for a signal, for `descriptor` to become readable (-1: none), or for timeout_s to pass
+  // (infinity: for ever; 0 or less: only looks). Like the constructor, throws std::system_error if
+  // the system refuses.
   Event wait(int descriptor, double timeout_s);
 
  private:

@@ -20,7 +20,8 @@ struct VerifyOptions {
 
 // How good a calibration is on a recording. Returns the exit code: kExitOk if the sigmas hold,
 // kExitFailed if they are contradicted, kExitUsage if the recording does not suffice to judge.
-// Throws CommandError, with kExitUsage: nothing was judged.
+// Throws CommandError, always with kExitUsage, if nothing was judged: an option, the recording or
+// the calibration cannot be used, a result cannot be written, or a signal came.
 [[nodiscard]] int verify_calibration(const VerifyOptions& options);
 
 }  // namespace alidade

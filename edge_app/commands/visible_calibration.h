@@ -12,9 +12,10 @@
 
 namespace alidade {
 
-// Calibrates. If the job has no tracks, they are found in the video first; with passes = 2 they are
-// then found again with the first estimate. *job gets the observations, the remarks and the options
-// that were used.
+// Calibrates. passes: 1 or 2. If the job has no tracks, they are found in the video first; with
+// passes = 2 they are then found again with the first estimate. *job gets the observations, the
+// remarks and the options that were used. Throws CommandError as track_video() does, and if no
+// point could be followed.
 [[nodiscard]] CalibrationResult calibrate_job(int passes, CalibrationJob* job,
                                               StopSignals* signals);
 

@@ -2,9 +2,9 @@
 // The configuration of `alidade`: one YAML file, strictly checked (yaml_section.h).
 //
 // Each value has the same unit here as in the file. A key that the file leaves out takes the
-// default below. A key without a default (types, addresses) is required. Passwords stand in the
-// environment (`password_env` names the variable) or in a file of their own (`password_file`),
-// never in this file. Relative paths start at the file's folder. Reading touches this file, the
+// default below. A key without a default (types, addresses) is required. Passwords come from the
+// environment (`password_env` names the variable) or from a file of their own (`password_file`),
+// never from this file. Relative paths start at the file's folder. Reading touches this file, the
 // environment, and the files of secrets and certificates that the file names. It tries no
 // connection.
 
@@ -37,8 +37,8 @@ struct CameraConfig {
   std::optional<FocalLengthRange> focal_length_range;
   double aspect = 1;
   double radial_distortion = 0;
-  // Sigma of the optical centre about the picture's middle, in each calibration. 0: the centre is
-  // the middle. Empty: 1 % of the width.
+  // px, sigma of the optical centre about the picture's middle, in each calibration. 0: the centre
+  // is the middle. Empty: 1 % of the width.
   std::optional<double> centre_sigma_px;
   double line_delay_s = 0;  // s/row, of the sensor read from top to bottom
   // The camera hangs upside down and turns its image by 180 degrees; negates line_delay_s.
@@ -54,8 +54,8 @@ struct CalibrationConfig {
   // Device units; two zoom readings that differ by no more are one zoom. Empty: found from their
   // jitter (steady_zoom.h).
   std::optional<double> zoom_tolerance;
-  // One standard deviation of the difference between the links' delay and the delay of the
-  // connection for which the calibration was stored, until movement has shown the delay. Empty:
+  // s, one standard deviation: how much the links' delay may differ from that of the connection for
+  // which the calibration was stored. Used until movement has shown the delay. Empty:
   // LinkDelay::kOpenSigma_s. If a value is set and the mode is PT, no picture is decoded.
   std::optional<double> clock_offset_sigma_s;
 };

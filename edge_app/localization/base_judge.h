@@ -1,6 +1,6 @@
 #pragma once
-// BaseJudge: how far a record is off the localized picture, and whether telemetry's zero or the
-// base has moved.
+// BaseJudge: how far a record's angles differ from those of the localized picture, and whether
+// telemetry's zero or the base has moved.
 //   change = localized angle - record's angle, at the row for which the map's pose holds
 // A record in telemetry's base is expected within zero_sigma of the map's base; a record in the
 // map's base is expected within its own sigma. A larger change is a movement once a second picture
@@ -33,8 +33,8 @@ class BaseJudge {
   explicit BaseJudge(const BaseJudgeOptions& options = {}) : options_(options) {}
 
   // found: a result with kOk for the record's frame, which has an orientation. reference_row: px,
-  // row for which its pose holds. Sets change_rad, covariance and moved of *told, and all of
-  // *offset: of telemetry's base in the map's, by this picture, whatever the verdict.
+  // row for which its pose holds. Whatever the verdict, sets change_rad, covariance and moved of
+  // *told, and all of *offset: the offset of telemetry's base in the map's, by this picture.
   [[nodiscard]] Verdict judge(const OrientationRecord& record, const Localization& found,
                               double reference_row, ToldBase* told, BaseOffset* offset);
 

@@ -1,11 +1,11 @@
 #pragma once
 // SceneLocalization: where a live picture looks by the scene map, and what follows for telemetry's
 // base. A picture is searched at the place and focal length of its record, else in the whole map
-// (core/mapping/localization.h). A picture that is not found changes nothing. A movement of base or
-// zero is logged once. A frame without orientation (no telemetry) is searched in the whole map,
-// with its calibration's focal length; a result at another zoom is refused. For a lens that zooms,
-// any focal length of its zoom curve is accepted. A result that contradicts nothing may update the
-// map (scene_upkeep.h). One thread, except for report().
+// (core/mapping/localization.h). A picture that is not found is counted and changes neither the
+// base nor the map. A movement of base or zero is logged once. A frame without orientation (no
+// telemetry) is searched in the whole map, with its calibration's focal length; a result at another
+// zoom is refused. For a lens that zooms, any focal length of its zoom curve is accepted. A result
+// that contradicts nothing may update the map (scene_upkeep.h). One thread, except for report().
 
 #include <memory>
 #include <mutex>
@@ -31,7 +31,7 @@ class SceneLocalization : public SceneLocator {
                     StoreMapChange store = nullptr);
   ~SceneLocalization() override;
 
-  void prepare() override;  // builds the index; frees the map unless it is kept up
+  void prepare() override;  // before look(): builds the index; frees the map unless it is kept up
   [[nodiscard]] Outcome look(const LocalizableFrame& frame, ToldBase* told) override;
 
   // What the keyframes show, as read at the start. Any thread.

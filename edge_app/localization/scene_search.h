@@ -1,6 +1,7 @@
 #pragma once
-// SceneSearch: finds where one picture looks in a scene map: with few features first, and with more
-// if few do not suffice (core/mapping/localization.h). Batch work: allocates. One thread at a time.
+// SceneSearch: finds where one picture looks in a scene map. It tries few features first, and more
+// features if the few do not suffice (core/mapping/localization.h). Batch work: allocates. One
+// thread at a time.
 
 #include <optional>
 #include <string>

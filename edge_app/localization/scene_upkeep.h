@@ -27,7 +27,8 @@ class SceneUpkeep {
   explicit SceneUpkeep(StoreMapChange store) : store_(std::move(store)) {}
 
   [[nodiscard]] bool keeps_up() const { return store_ != nullptr; }
-  // found: kOk, from these features. *map: equals the map on disk, before and after.
+  // Does nothing unless keeps_up(). found: kOk, from these features. *map: equals the map on disk,
+  // before and after.
   void show(const Localization& found, const FeatureSet& features, double time_utc_s,
             SceneMap* map);
 

@@ -15,8 +15,8 @@ nlohmann::ordered_json parameters_json(const Calibration& calibration);
 // All of calibration.yaml except the notes on the run that wrote it.
 nlohmann::ordered_json calibration_json(const Calibration& calibration);
 
-// The telemetry's errors that were found, with the keys of calibration.yaml; a curve has samples
-// beside its knots.
+// The telemetry's errors that were found, with the keys of calibration.yaml; a curve has samples in
+// addition to its knots.
 nlohmann::ordered_json telemetry_error_json(const TelemetryError& error);
 
 // curve: not empty. Its nodes at dwells, and samples of the focal length (px) from the first to the

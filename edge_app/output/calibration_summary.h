@@ -21,8 +21,8 @@ struct SummaryRow {
   std::string prior;  // value and sigma in `unit`; "none": the parameter had no prior
 };
 
-// One row for each scalar parameter, one for each axis: its unit vector, and the sigmas of its two
-// components in mrad. The optical centre has rows only if it was estimated.
+// One row for each scalar parameter, and one for each axis. An axis's row has its unit vector and
+// the sigmas of its two components in mrad. The optical centre has rows only if it was estimated.
 std::vector<SummaryRow> summary_rows(const CalibrationResult& result,
                                      const CalibrationOptions& options);
 

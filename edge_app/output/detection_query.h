@@ -19,7 +19,7 @@
 
 namespace alidade {
 
-// Of a body; the HTTP server refuses a longer one.
+// Bytes, the largest body or line. The HTTP server refuses a longer body, `replay` a longer line.
 inline constexpr std::size_t kMaxDetectionBytes = std::size_t{128} << 10;
 
 struct DetectionQuery {

@@ -7,9 +7,8 @@
 
 namespace alidade {
 
-// title and body are HTML. Classes for the body: verdict (weak), verdicts (with
-// items good, grown, weak), facts, words, scroll, pair, plot, key,
-// soft, and those of SvgPlot.
+// title and body are HTML. Classes for the body: verdict (weak), verdicts (with items good, grown,
+// weak), facts, words, scroll, pair, plot, key, soft, and the classes of SvgPlot.
 [[nodiscard]] std::string html_page(const std::string& title, const std::string& body);
 
 // A heading and its lines; empty if there are no lines. title: HTML; lines: plain text.

@@ -59,10 +59,11 @@ struct HttpApiSources {
 // The zoom curve in use. Null: there is none.
 [[nodiscard]] std::shared_ptr<const ZoomCurve> zoom_curve_of(const HttpApiSources& sources);
 
-// `live` and the functions are used on the server's threads, several at a time, until the server
-// has stopped. Functions must be set unless they "may be empty". Every record wakes the server, and
-// so does every line of target_lines, whose on_news is replaced: call this before the first one.
-// The server must exist as long as they come, even after it has stopped.
+// `live` must not be null. `live` and the functions are used on the server's threads, several at a
+// time, until the server has stopped. Functions must be set unless they "may be empty". Every
+// record wakes the server, and so does every line of target_lines, whose on_news is replaced. So
+// call this before the first record and the first line. The server must exist as long as records or
+// lines come, even after it has stopped.
 void add_api_routes(HttpServer* server, const HttpApiSources& sources);
 
 }  // namespace alidade

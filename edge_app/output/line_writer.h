@@ -20,14 +20,15 @@ class LineWriter {
     kDrop   // lines for which there is no room are dropped
   };
 
-  // Does not own `descriptor`. name: of the file; what: of the lines, both for messages.
+  // Does not own `descriptor`. name: of the file; what: of the lines, both for messages. Throws
+  // std::system_error if the system gives no eventfd.
   LineWriter(int descriptor, std::string name, std::string what, Stalled stalled);
   ~LineWriter();
   LineWriter(const LineWriter&) = delete;
   LineWriter& operator=(const LineWriter&) = delete;
 
-  // The line must end with a line feed. False: no more can be written, see error(); of a pipe whose
-  // reader has gone, error() is empty.
+  // One thread. The line must end with a line feed. False: no more can be written, see error(),
+  // which is empty if the reader of a pipe went away.
   [[nodiscard]] bool write(std::string line);
   // Any thread. From now on write() does not wait.
   void interrupt();

@@ -1,12 +1,13 @@
 #pragma once
 // LiveState: the latest records of `alidade run`, for readers on other threads. It keeps the
-// records of the last seconds complete (for directions of pixels), the last minute and the last hour
-// thinned out (for plots), and lines of JSON (for readers that follow).
+// records of the last seconds complete (for directions of pixels), the last minute and the last
+// hour thinned out (for plots), and lines of JSON (for readers that follow it).
 //
 // All readers share one ring of lines. No reader waits for another. A reader that is too slow loses
-// the oldest lines and learns how many. write() is for the output thread: it formats the record,
-// holds a lock for microseconds and never waits for a reader. Any thread may call all other
-// functions. Memory is bounded: about 3 kB for each kept or held record and 1.5 kB for each line.
+// the oldest lines and learns how many. write() is for the output thread: it formats the record and
+// holds a lock for microseconds. Readers hold this lock only while they copy, so write() does not
+// wait for a slow reader. Any thread may call all other functions. Memory is bounded: about 3 kB
+// for each kept or held record and 1.5 kB for each line.
 
 #include <cstdint>
 #include <deque>
@@ -105,7 +106,7 @@ class LiveState final : public RecordSink {
   };
 
   [[nodiscard]] std::vector<ReaderCounters> readers() const;
-  // Of all readers, present and past.
+  // Records lost by all readers, present and past.
   [[nodiscard]] std::int64_t lost_by_readers() const;
 
  private:

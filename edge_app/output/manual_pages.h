@@ -1,8 +1,9 @@
 #pragma once
 // The manual in a browser: GET /manual/ and the files below it, as the package has installed them.
 // No token is needed. Only plain files of known kinds in that folder are served: a path with an
-// empty or hidden part, as `..`, is refused, and so is a link that leads out of the folder. The
-// pages come with a Content-Security-Policy that allows files of this server and nothing else.
+// empty or hidden part, as `..`, is refused, and so are a link that leads out of the folder and a
+// file of more than 16 MiB. The pages come with a Content-Security-Policy that allows files of this
+// server and nothing else.
 
 #include <string>
 
@@ -10,7 +11,7 @@
 
 namespace alidade {
 
-// share/doc/alidade/manual beside the folder of this program; empty if that is not known.
+// share/doc/alidade/manual next to the folder of this program; empty if that is not known.
 [[nodiscard]] std::string installed_manual();
 
 // folder: as of installed_manual(). It is looked for at each request, as it may be installed later.

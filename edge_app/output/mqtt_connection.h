@@ -48,8 +48,8 @@ class MqttConnection {
   // The descriptor to wait for: the socket, or, while the broker's name is looked up, a descriptor
   // that becomes readable at the end. Negative: none.
   [[nodiscard]] int socket() const;
-  // What to wait for at socket(), and patience_s(): how long at most, s. During the TLS handshake
-  // the library does not say what it waits for.
+  // What to wait for at socket(). patience_s(): how long to wait at most, s. During the TLS
+  // handshake the library does not say what it waits for.
   [[nodiscard]] bool wants_to_read() const { return half_since_s_ < 0; }
   [[nodiscard]] bool wants_to_write() const;
   [[nodiscard]] double patience_s() const;
@@ -60,7 +60,8 @@ class MqttConnection {
   // Disconnects properly, so that the broker does not publish the will.
   void end();
 
-  // Checks the TLS files before a connection is tried. Empty if all can be read.
+  // Checks the TLS files before a connection is tried. One line on what is wrong; empty if all can
+  // be read.
   [[nodiscard]] static std::string files_error(const MqttOptions& options);
   // For `check`: makes one connection without a will. Empty if the broker accepts it within
   // options.timeout_s, else what failed.

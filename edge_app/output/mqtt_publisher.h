@@ -5,10 +5,10 @@
 //   PREFIX/clock         host clock and wall clock (clock_pair.h), every ten seconds; retained
 //   PREFIX/orientation   the newest record, at most orientation_rate_hz times a second
 // For each topic at most one message is under way and one waits; a newer message replaces the one
-// that waits. So a slow, silent or missing broker costs no memory, delays nobody, and gets the
-// newest state when it is back. The pauses between attempts to connect grow. The first connection
-// deletes targets that the broker retains from an earlier run, as their times and identities have
-// lost their meaning.
+// that waits. So a slow, silent or missing broker costs no memory, delays no other thread, and gets
+// the newest state when it is back. The pauses between attempts to connect grow. The first
+// connection deletes targets that the broker retains from an earlier run, as their times and
+// identities have lost their meaning.
 
 #include <array>
 #include <atomic>

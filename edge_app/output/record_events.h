@@ -3,11 +3,11 @@
 // /api/v1/stream).
 //
 //   hello         first
-//   clock         every few seconds
+//   clock         after hello, then every 5 s
 //   orientation   for each record
 //   lost          if the client was too slow
 //   targets       after each frame of detections; the newest, if several came
-//   (comment)     if nothing else came for a while
+//   (comment)     if nothing else came for 3 s
 
 #include <string>
 
@@ -19,7 +19,7 @@ namespace alidade {
 
 class RecordEvents final : public HttpStream {
  public:
-  // Owns neither pointer. targets: null if nothing is tracked.
+  // *live and *targets must outlive this object. targets: null if nothing is tracked.
   RecordEvents(LiveState* live, const TargetLines* targets, std::string version);
 
   void next(std::string* piece) override;

@@ -1,8 +1,8 @@
 #pragma once
-// RecordHistory: what plots need of the records of the last while, in rows of at least step_s.
-// A row begins with the first record that comes step_s or more after the row before began. A record
-// counts at its time_s, or at its receive_time_s if it has none. If time goes back, all is forgotten.
-// Memory is bounded by length_s / step_s rows. For one thread.
+// RecordHistory: what plots need of the records of the last length_s, in rows of at least step_s. A
+// row begins with the first record that comes step_s or more after the row before began. A record
+// counts at its time_s, or at its receive_time_s if it has none. If time goes back, all is
+// forgotten. Memory is bounded by length_s / step_s rows. For one thread.
 
 #include <cstdint>
 #include <deque>
@@ -15,25 +15,25 @@
 namespace alidade {
 
 struct HistorySample {
-  // Of the row's first record.
+  // The row's first record:
   double time_s = 0;
   RecordMode mode = RecordMode::kNone;
   std::optional<double> pan_rad;
   std::optional<double> tilt_rad;
   int landmarks = 0;
   std::optional<double> residual_px;
-  // Of all its records.
+  // All records of the row:
   std::optional<double> latency_s;                 // the longest
   std::optional<double> sigma_rad;                 // the largest about any of the camera's axes
   std::optional<PanTilt<double>> telemetry_error;  // rad, root mean square
-  // Of its last record with a calibration.
+  // The row's last record with a calibration:
   std::optional<double> clock_offset_s;
   std::optional<double> clock_offset_sigma_s;
 };
 
 class RecordHistory {
  public:
-  // Both > 0.
+  // s, both > 0.
   RecordHistory(double length_s, double step_s) : length_s_(length_s), step_s_(step_s) {}
 
   void add(const OrientationRecord& record);

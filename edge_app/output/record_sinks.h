@@ -9,7 +9,7 @@ namespace alidade {
 
 class RecordSinks final : public RecordSink {
  public:
-  // Must be called before the first record. Does not own the sink.
+  // Must be called before the first record. The sink must outlive this object.
   void add(RecordSink* sink) { sinks_.push_back(sink); }
 
   [[nodiscard]] bool write(const OrientationRecord& record) override {

@@ -1,7 +1,7 @@
 #pragma once
-// RecordWriter: writes records as lines to a file descriptor. In `run` to stdout alone; to a file
-// in `replay` only, as a write to a disk waits and a failure ends the program. Slow readers: see
-// line_writer.h.
+// RecordWriter: writes records as lines to a file descriptor. `run` uses it for stdout alone. Only
+// `replay` also writes a file with it, as a write to a disk may wait, and a failure ends the
+// program. Slow readers: see line_writer.h.
 
 #include <cstddef>
 #include <string>

@@ -1,8 +1,8 @@
 #pragma once
 // The status page of `alidade run`: page/ as one page at GET /, and the live image that it shows.
 //
-//   GET /                   needs no token: the page itself says nothing of the camera. Its script
-//                           asks for all that is shown, with the token
+//   GET /                   needs no token: the page itself tells nothing about the camera. Its
+//                           script asks for all that is shown, with the token
 //   GET /api/v1/picture     a JPEG of a current frame, at most 480 px wide; its frame number is in
 //                           X-Alidade-Frame
 //   GET /api/v1/overlay     the landmarks of a frame (?frame=N, one of the last 16 shown), or of a

@@ -32,7 +32,7 @@ class SvgPlot {
 
   // diameter: px.
   void dots(const std::vector<PlotPoint>& points, const char* colour, double diameter = 2.2);
-  // Of lines, areas and all below, coordinates must be finite.
+  // The coordinates of lines, areas and everything below must be finite.
   void line(const std::vector<PlotPoint>& points, const char* colour);
   // Fills the area between the lines `low` and `high`, without drawing these lines.
   void area(const std::vector<PlotPoint>& low, const std::vector<PlotPoint>& high,

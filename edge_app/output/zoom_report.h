@@ -1,8 +1,8 @@
 #pragma once
 // report.html of a calibration over several zooms: the curves of focal length, distortion and
 // optical centre over the zoom reading with their sigmas, the dwells and the
-// zoom's movements that made them, and how far each lies from the curve. A page as calibration_report.h's.
-// Pure; allocates.
+// zoom's movements that made them, and how far each lies from the curve. The page is like that of
+// calibration_report.h. Pure; allocates.
 
 #include <string>
 #include <vector>

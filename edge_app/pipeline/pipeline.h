@@ -13,7 +13,7 @@
 // A source that loses its connection is waited for. Records of mode `none` are made at the loss and
 // then each second. The pipeline is finished when the video has ended, a source has failed for
 // good, or the sink takes no more. stop() ends it at any time. One thread owns the pipeline and
-// calls everything here, except summary(), zoom_curve(), telemetry_error() and calibration_progress().
+// calls everything here, except the functions marked "any thread".
 
 #include <atomic>
 #include <cstdint>
@@ -46,7 +46,7 @@ struct PipelineOptions {
   int height = 0;
   std::string calibration_name;
   bool measure_latency = true;       // false for a recording: its stamps are of another clock
-  ImageTap* tap = nullptr;           // borrowed, like the sources; null: nobody asks for images
+  ImageTap* tap = nullptr;           // borrowed, like the sources; null: no images are wanted
   SceneTap* scene = nullptr;         // likewise; null: there is no scene map
   DetectorTap* detectors = nullptr;  // likewise; null: there is no detector
 };
@@ -57,8 +57,8 @@ struct PipelineSummary {
   double delay_wander_s = 0;  // s, of the video, as of the last frame; 0: it does not wander
   // The rate of the sender's time stamps, less one, if they are left out because of it.
   std::optional<double> stamps_left_out;
-  // As of the last frame (empty: no calibration), and the host's time since which it has this
-  // state.
+  // link_delay: as of the last frame; empty: no calibration. link_delay_since_s: s, host time since
+  // when link_delay has its present state.
   std::optional<LinkDelayReport> link_delay;
   double link_delay_since_s = 0;
   std::int64_t records = 0;
@@ -82,7 +82,8 @@ struct PipelineSummary {
 
 class Pipeline {
  public:
-  // Borrows everything until it is destroyed. calibration: null if nothing is to be calibrated.
+  // Borrows everything until it is destroyed, but copies the options. calibration: null if nothing
+  // is to be calibrated. Throws std::system_error if the system gives no eventfd.
   Pipeline(FrameSource& video, PanTiltSource& pan_tilt, RecordSink& sink,
            SelfCalibration* calibration, const PipelineOptions& options);
   ~Pipeline();

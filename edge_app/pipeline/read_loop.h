@@ -1,8 +1,8 @@
 #pragma once
-// read_to_the_end(): reads a source from the first item to the last, over losses of the connection,
-// for a capture or telemetry thread. Logs each loss and return, what a connected source waits for,
-// and what it notes of its device or finds wrong with its stream. Allocates and waits: never on the
-// real-time thread.
+// read_to_the_end(): reads a source from the first item to the last, across losses of the
+// connection, for a capture or telemetry thread. Logs each loss and return, what a connected source
+// waits for, and what it notes of its device or finds wrong with its stream. Allocates and waits:
+// never on the real-time thread.
 
 #include <spdlog/spdlog.h>
 
@@ -83,8 +83,9 @@ bool refuse(Source& source, const std::string& fault) {
 // Item: Frame or PanTiltSample. on_item(item): returns false to end. on_loss(now_s): called at a
 // loss and then each second until the next item. fault_of(item): why an item cannot be used; empty
 // if it can. A faulty first item ends the loop with its fault as error. After a good item a fault
-// is the peer's doing, and the source gives up the connection. *watch is informed of all this.
-// Returns the error if the source failed for good, else an empty text.
+// is the peer's doing, and the source gives up the connection. If it has none to give up
+// (FrameSource::refuse()), the fault ends the loop, too. *watch is informed of all this. Returns
+// the error if the source failed for good, else an empty text.
 template <typename Item, typename Source, typename OnItem, typename OnLoss,
           typename FaultOf = TakesAll>
 std::string read_to_the_end(Source& source, LinkWatch* watch, const OnItem& on_item,

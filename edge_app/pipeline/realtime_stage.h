@@ -12,10 +12,10 @@
 // Images stay where the decoder put them: a frame occupies a slot of the capture thread, and the
 // last thread to use the image returns the slot. Each queue has one producer, one consumer, a fixed
 // capacity and fixed-size messages. A full queue drops the new message and counts it; no thread
-// waits for another. In OE mode a live frame that has waited for long while others wait behind it
-// loses its image: on a slow processor some records are telemetry's, but none is seconds late.
-// process() allocates nothing, takes no lock, logs nothing and throws nothing; the constructor has
-// touched all memory that it writes.
+// waits for another. In OE mode a live frame that has waited for more than 0.1 s while others wait
+// behind it loses its image: on a slow processor some records are telemetry's, but none is seconds
+// late. process() allocates nothing, takes no lock, logs nothing and throws nothing; the
+// constructor has touched all memory that it writes.
 
 #include <atomic>
 #include <boost/lockfree/spsc_queue.hpp>
@@ -35,7 +35,7 @@ struct VideoMessage {
   enum class Kind : std::uint8_t { kFrame, kLost };
   Kind kind = Kind::kFrame;
   FrameStamp stamp;  // kFrame
-  ImageView image;   // kFrame; not valid() if nobody looks at images
+  ImageView image;   // kFrame; not valid() if images are not used
   ImageSlot slot = kNoImageSlot;
   double decoded_s = 0;  // s, host time at the push of the frame
   double time_s = 0;     // s, kLost: host time of the news
@@ -128,7 +128,7 @@ class RealtimeStage {
   // Requests the next frame's image.
   void want_image() { image_wanted_.store(true, std::memory_order_relaxed); }
   // The real-time thread adopts the calibration between two frames. The calibration must live until
-  // pop_adopted() returns it. False: too many wait already.
+  // pop_adopted() returns it. False: four wait already.
   bool publish(const PublishedCalibration* calibration);
   bool pop_adopted(const PublishedCalibration*& calibration) { return adopted_.pop(calibration); }
   void report(CalibrationReport report) { report_.store(report, std::memory_order_relaxed); }

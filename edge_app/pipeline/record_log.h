@@ -1,7 +1,7 @@
 #pragma once
-// RecordLog: logs what is remarkable about records and the events beside them: old telemetry,
-// clocks, the delay of the links, repeated images, full queues. An event that every record may have
-// is logged rarely. For the output thread.
+// RecordLog: logs what is remarkable about records and the events that come with them: old
+// telemetry, clocks, the delay of the links, repeated images, full queues. An event that every
+// record may have is logged rarely. For the output thread.
 
 #include "edge_app/pipeline/realtime_stage.h"
 #include "platform/pan_tilt/pan_tilt_source.h"

@@ -38,7 +38,7 @@ struct FrameGeometry {
   PanTilt<double> rate;                   // rad/s
   PanTilt<double> acceleration;           // rad/s^2
   double zoom_rate = 0;                   // 1/s
-  std::optional<double> zoom_rate_sigma;  // 1/s; none: the lens is taken as at rest
+  std::optional<double> zoom_rate_sigma;  // 1/s; empty: the lens is taken to be at rest
   std::array<double, 36> motion_covariance{};
   std::array<double, 6 * kParameterCount> motion_sensitivity{};
 };

@@ -70,7 +70,7 @@ struct OrientationRecord {
 };
 static_assert(std::is_trivially_copyable_v<OrientationRecord>);
 
-// Of row 0: angles wrapped to [-pi, pi), w of the quaternion >= 0.
+// The orientation at row 0: angles wrapped to [-pi, pi), w of the quaternion >= 0.
 [[nodiscard]] OrientationRecord::Orientation orientation_of(const FrameOrientation& frame);
 
 // Where the records go. Called by the output thread alone, except for interrupt().

@@ -1,6 +1,6 @@
 #pragma once
-// ReasonCounts: how many records had which status, among those not in OE mode, or, if OE mode is
-// not asked for, among those without orientation. Fixed size; add() allocates nothing.
+// ReasonCounts: counts, by status, the records that are not in OE mode or, if OE mode is not asked
+// for, those without orientation. Fixed size; add() allocates nothing.
 
 #include <array>
 #include <cstdint>

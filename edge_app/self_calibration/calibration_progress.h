@@ -1,6 +1,6 @@
 #pragma once
-// CalibrationProgress: how far SelfCalibration is with a first calibration, or with a fresh one that
-// was asked for. Plain values; another thread shows them.
+// CalibrationProgress: how far SelfCalibration is with a first calibration, or with a fresh one
+// that was asked for. Plain values, which another thread shows.
 
 #include <string>
 
@@ -10,7 +10,7 @@
 namespace alidade {
 
 struct CalibrationProgress {
-  int attempts = 0;      // with the data of this session and of those whose place it took
+  int attempts = 0;      // with the data of this session and of the sessions that it replaced
   std::string refusal;   // the latest attempt's line in the log; empty: none was made
   ParameterGoals goals;  // by which the latest attempt was judged; before it without sigmas
   TravelLimits travel;   // of the camera as it is known so far

@@ -1,6 +1,6 @@
 #pragma once
 // Why a session gave no calibration, and what would help. If pictures were sent again while the
-// camera turned, nobody knows when the other pictures were taken. If most pictures were never
+// camera turned, it is not known when the other pictures were taken. If most pictures were never
 // looked at, as on an overloaded machine, too few were seen. In both cases the reason says so, and
 // the mismatch between telemetry and motion, which is only a consequence, is not reported. Pure;
 // allocates.

@@ -58,16 +58,16 @@ class CalibrationSession {
 
   [[nodiscard]] bool empty() const { return frames_.empty(); }
   [[nodiscard]] std::size_t frames() const { return frames_.size(); }
-  // By the frames' receive times: newest minus oldest; the newest. 0 without frames.
+  // s, receive times of the frames: newest minus oldest, and the newest. 0 without frames.
   [[nodiscard]] double span_s() const;
   [[nodiscard]] double newest_s() const;
 
-  // Of the telemetry in the time of the frames; empty: there is none.
+  // The range of telemetry's angles in the time of the frames; empty: there are none.
   [[nodiscard]] std::optional<AngleRange> angle_range() const;
   // width, height: of the image, px.
   [[nodiscard]] ViewCoverage coverage(int width, int height) const;
 
-  // Of the frames, in order of arrival.
+  // The frames' stamps, in order of arrival.
   [[nodiscard]] std::vector<FrameStamp> stamps() const;
   [[nodiscard]] std::vector<PanTiltSample> telemetry() const;
   [[nodiscard]] std::vector<CalibrationObservation> observations() const;

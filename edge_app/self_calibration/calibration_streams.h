@@ -8,7 +8,7 @@
 //             [earliest_time_s, latest_time_s], with sigma = width / sqrt(12). Each poll has an
 //             error of its own, and one error is common to all: a device answers at a fixed place
 //             of the interval.
-//   repeats   Repeats of an old angle while the head turned say nothing of their own time. They are
+//   repeats   Repeats of an old angle while the head turned do not show their own time. They are
 //             left out (stale_repeats.h).
 //   noise     Receive times err to both sides if the input's noise has a stamp sigma. Otherwise
 //             they are only ever late, as in `run` and `replay`.

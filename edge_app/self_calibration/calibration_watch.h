@@ -50,9 +50,9 @@ class ContradictionJudge {
   int in_a_row_ = 0;
 };
 
-// Counts frames of which something is true. SelfCalibration withdraws by it where landmarks
-// contradict telemetry in half of the frames of some seconds; StreamWatch counts old telemetry and
-// repeated pictures by judges of its own, which withdraw nothing.
+// Judges by the latest frames whether something holds in a large share of them. SelfCalibration
+// withdraws a calibration if landmarks contradict telemetry in that share. StreamWatch has judges
+// of its own for old telemetry and repeated pictures; these withdraw nothing.
 struct DisagreementOptions {
   double span_s = 8;              // the frames of this latest time are judged
   double share = 0.5;             // of these frames, 0 to 1

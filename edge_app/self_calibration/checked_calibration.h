@@ -5,8 +5,9 @@
 //   excess      = max(1, hold_out / unit): by how much the calibration predicts worse than it
 //               claims
 //   covariance  = excess^2 times that of calibrate(). With a free optical centre only the part that
-//               is not from priors grows. Added: what a known calibration's centre leaves open, and
-//               to the clock offset's variance the error that all polls of the telemetry share.
+//               is not from priors grows. Added: the share of a known calibration's covariance that
+//               comes from its optical centre, and to the clock offset's variance the error that
+//               all polls of the telemetry share.
 // The held-out frames show errors that residuals do not: a trajectory that is coarser than the
 // motion, or patches whose errors are alike in neighbouring frames.
 // Pure; allocates; takes tenths of a second.

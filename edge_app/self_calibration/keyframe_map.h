@@ -30,8 +30,8 @@ struct Keyframe {
 
 // The trajectory at a time (image clock, within its span), for OeMode::process(): angles, rates and
 // accelerations as telemetry would measure them (true ones times scale), angles wrapped. sigma_px:
-// one standard deviation of either angle, given as the motion of the image's centre, px. That of
-// either rate is the angle's times 20/s.
+// one standard deviation of each angle, given as the motion of the image's centre, px. The sigma of
+// each rate is that of the angle times 20/s.
 [[nodiscard]] InterpolatedPanTilt predict(const CalibrationResult& result, double time_s,
                                           double sigma_px);
 

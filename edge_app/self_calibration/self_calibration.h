@@ -145,7 +145,7 @@ class SelfCalibration {
   CalibrationSession session_;
   FrameTracks::Tracker tracker_ = FrameTracks::Tracker::kNone;  // of the session's points
   TryPace pace_;
-  // Of the last try for a first calibration. Without goals, it did not come so far.
+  // What the last try for a first calibration gave. Without goals: it did not come so far.
   CalibrationNeed need_ = CalibrationNeed::kNothing;
   std::string refusal_;
   std::optional<ParameterGoals> goals_;

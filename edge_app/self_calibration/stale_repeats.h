@@ -2,14 +2,14 @@
 // Stale repeats in polled telemetry, and the angular resolution of the device.
 //
 // A device that is polled faster than it measures repeats its last value. The value was true when
-// it first came. If the head has turned meanwhile, the repeat is stale: it says nothing of its own
-// time. In a run of equal values, all but the first sample are stale if the samples around the run
-// show that the head turned on. In doubt a sample is not stale. Derivation: docs/derivations.md.
-// These functions need the whole data: `calibrate`, the calibration thread and `check` use them.
-// The real-time step cannot wait: TelemetryBuffer takes every repeat younger than
+// it first came. If the head has turned meanwhile, the repeat is stale: it shows nothing about its
+// own time. In a run of equal values, all but the first sample are stale if the samples around the
+// run show that the head turned on. In doubt a sample is not stale. Derivation:
+// docs/derivations.md. These functions need the whole data: `calibrate`, the calibration thread and
+// `check` use them. The real-time step cannot wait: TelemetryBuffer takes every repeat younger than
 // pan_tilt.max_repeat_s as unknown. Both take a value as true when it first came, so a clock offset
-// found with one holds for the other.
-// Radians, seconds; a sample's time is the middle of its interval. Pure functions; they allocate.
+// found with one holds for the other. Radians, seconds; a sample's time is the middle of its
+// interval. Pure functions; they allocate.
 
 #include <cstddef>
 #include <vector>

@@ -1,8 +1,8 @@
 #pragma once
 // steady_zoom(): removes the jitter from the zoom readings of a whole recording
 // (core/model/steady_zoom.h). All readings of one rest get one level, their median, unless the rest
-// creeps. Those of a movement are changed to the nearest ones that never turn back, if jitter
-// explains the change. Exact readings stay as they are. Pure; allocates.
+// creeps. The readings of a movement are changed to the nearest ones that never turn back, if
+// jitter explains the change. Exact readings stay as they are. Pure; allocates.
 
 #include <optional>
 #include <vector>

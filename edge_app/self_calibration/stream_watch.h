@@ -31,7 +31,7 @@ class StreamWatch {
   // Share of the latest frames whose picture was sent again, 0 to 1.
   [[nodiscard]] double repeated_share() const;
 
-  // The latest receive time of either stream.
+  // s, the latest receive time of a frame or sample.
   [[nodiscard]] double now_s() const { return now_s_; }
   // What must improve before anything is calibrated or withdrawn; empty: nothing.
   [[nodiscard]] std::optional<CalibrationNeed> unsteady() const;

@@ -33,7 +33,7 @@ enum class Untracked {
   kTooShort,     // followed through fewer than kMinSightings frames
   kBeyondLimit,  // left out because of max_observations
 };
-// By CalibrationFrame::frame.
+// Key: CalibrationFrame::frame.
 using UntrackedFrames = std::unordered_map<std::int64_t, Untracked>;
 
 inline constexpr int kMinSightings = 5;

@@ -11,7 +11,8 @@
 
 namespace alidade {
 
-// Of telemetry as it came, in the time of the session's frames. Pan is continuous over +-180 deg.
+// The range of telemetry's angles as they came, in the time of the session's frames. Pan is
+// continuous over +-180 deg.
 struct AngleRange {
   PanTilt<double> least;
   PanTilt<double> largest;

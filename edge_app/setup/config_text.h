@@ -32,7 +32,7 @@ class ConfigText {
 // In double quotes, with escapes.
 [[nodiscard]] std::string yaml_quoted(const std::string& text);
 
-// "62" or "62:2.3" (wide:tele), horizontal fields of view in degrees: the value of
+// "62" or "62:2.3" (wide:tele), horizontal fields of view in degrees, 0.05 to 150: the value of
 // camera.focal_length_px for pictures of this width. False: *error says what would be right.
 [[nodiscard]] bool focal_length_of(const std::string& field_of_view, int width_px,
                                    std::string* value, std::string* error);

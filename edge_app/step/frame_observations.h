@@ -11,8 +11,8 @@
 
 namespace alidade {
 
-// Sets points and count, and leaves the rest. Points beyond kMaxFramePoints are left
-// out.
+// Sets points and count, and leaves the other members as they are. Points beyond kMaxFramePoints
+// are left out.
 void get_tracks(const StartUpTracker& tracker, FrameTracks* tracks);
 // Sets oe_status, too. There are points only if it is kOk: the inliers that are not edges
 // (track_sigma()).

@@ -64,7 +64,7 @@ struct OrientationStepOptions {
   ZoomCurve zoom_curve;  // for other zooms; may be empty
   // s, one standard deviation: how much the delays of two connections usually differ.
   double minimum_delay_sigma_s = 5e-3;
-  // s, the same for a connection whose delay nobody has seen yet (link_delay.h).
+  // s, the same for a connection whose delay has not been seen yet (link_delay.h).
   double unseen_delay_sigma_s = LinkDelay::kOpenSigma_s;
   // In PT mode: there are images, and points are followed in them to find that delay.
   bool follow_turns = false;
@@ -134,7 +134,7 @@ class OrientationStep {
   // The same for a frame without orientation, if there is no telemetry. *angular_velocity: rad/s,
   // camera frame. False: it is not needed, or the camera cannot be followed from this frame on.
   bool ask_where_it_looks(Vector3<double>* angular_velocity);
-  // The result of either request. From the next frame on records are in the map's base
+  // The result of one of these two requests. From the next frame on records are in the map's base
   // (base_tie.h), whatever is adopted.
   void settle_base(const ToldBase& told);
   // Takes over another calibration with its map. Call between two frames.
@@ -190,7 +190,7 @@ class OrientationStep {
   void orient(const InterpolatedPanTilt* measured, const ImageView& image, const FrameLens* lens,
               OrientationRecord* record);
 
-  // Of a record of mode OE, complete but for this: see there.
+  // OrientationRecord::telemetry_error of a record of mode OE that is complete but for this member.
   [[nodiscard]] static PanTilt<double> telemetry_error(const InterpolatedPanTilt& measured,
                                                        const FrameOrientation& frame,
                                                        const OrientationRecord& record);
@@ -220,7 +220,7 @@ class OrientationStep {
   InUse now_;
   TelemetryIntake telemetry_;
   std::unique_ptr<OeMode> oe_;                // null: PT mode
-  std::unique_ptr<StartUpTracker> start_up_;  // null: nobody needs its points
+  std::unique_ptr<StartUpTracker> start_up_;  // null: its points are not needed
   ZoomReadings zoom_;
   ReadLens lens_;
   bool zoom_on_curve_ = false;  // the present zoom lies on the zoom curve

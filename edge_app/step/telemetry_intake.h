@@ -25,7 +25,7 @@ struct TelemetryIntakeOptions {
   // Its period_sigma_s applies to filtered times only. resolution 0: found from the readings.
   TelemetryNoise noise;
   TelemetryLimits limits;
-  // True: samples of stalled polls are left out, as nobody knows when they were true, unless a
+  // True: samples of stalled polls are left out, as it is not known when they were true, unless a
   // locked clock gives their time.
   bool leave_out_stalled = false;
 };
@@ -41,8 +41,8 @@ class TelemetryIntake {
   struct Taken {
     bool restarted = false;        // earlier times cannot be asked for any more
     std::optional<double> time_s;  // telemetry time; empty: the sample is left out
-    // If there is a time. rad, measured units, without the known errors of the angles, and the
-    // variance of what is left of these (pan, tilt), rad^2.
+    // Set if there is a time. angle: rad, measured units, without the known errors of the angles.
+    // error_variance: rad^2, variance of what is left of these errors (pan, tilt).
     PanTilt<double> angle;
     Vector2<double> error_variance = Vector2<double>::Zero();
   };

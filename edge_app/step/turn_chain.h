@@ -6,9 +6,9 @@
 // w is of the middle rows, T the time between them, l the line delay, v a row: exact for a camera
 // that turns at an even rate. Robust least squares (Cauchy): points that move by themselves count
 // little. R_first_from_now = R_first_from_before Exp(w); its covariance is of R Exp(xi), xi in the
-// camera frame of `now`. No step, and so an end of the chain: fewer than 12 common points or half
-// of their weight, T not in (0, 0.5 s), or a bad fit.
-// Radians, seconds. Fixed memory; no allocation. One thread.
+// camera frame of `now`. There is no step, and the chain ends, with fewer than 12 common points or
+// half of their weight, with T not in (0, 0.5 s), or after a bad fit. Radians, seconds. Fixed
+// memory; no allocation. One thread.
 
 #include <array>
 #include <optional>

@@ -21,13 +21,13 @@
 
 namespace alidade {
 
-// Whether a zoom reading (device units) lies between the curve's first and last zoom. Beyond these
-// the curve continues, with less certainty.
+// Whether a zoom reading (device units) lies between the first and last zoom of the curve, which
+// must not be empty. Beyond these the curve continues, with less certainty.
 [[nodiscard]] inline bool is_between_zooms(const ZoomCurve& curve, double reading) {
   return (reading - curve.first_reading()) * (reading - curve.last_reading()) <= 0;
 }
 
-// The name, for people, of what a file's curve gives at a reading.
+// The name, for people, of what a file's curve, not empty, gives at a reading.
 [[nodiscard]] inline std::string name_on_curve(const std::string& path, const ZoomCurve& curve,
                                                double reading) {
   return path + (is_between_zooms(curve, reading) ? ", between its zooms" : ", beyond its zooms");

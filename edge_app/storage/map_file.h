@@ -1,9 +1,10 @@
 #pragma once
-// map.bin: what one calibration knows of the scene, beside its calibration.yaml: the points
-// adjusted with the calibration, and OE mode's map. The map's directions contain the calibration's
-// errors, so a map is refused with any other calibration. Not for the real-time thread: allocates,
-// reads and writes files. No shared state. Little-endian, packed. Sizes are for a calibration of 11
-// parameters_of(); in brackets for one of 13, which has an optical centre of its own:
+// map.bin: what one calibration knows of the scene, in the folder of its calibration.yaml: the
+// points adjusted with the calibration, and OE mode's map. The map's directions contain the
+// calibration's errors, so a map is refused with any other calibration. Not for the real-time
+// thread: allocates, reads and writes files. No shared state. Little-endian, packed. Sizes are for
+// a calibration of 11 parameters_of(); in brackets for one of 13, which has an optical centre of
+// its own:
 //   offset 0   8 bytes  "ALIDMAP\n"
 //          8   u32      format version, 3
 //         12   u32      calibration_check() of the calibration it belongs to
@@ -53,7 +54,8 @@ struct MapContent {
 // CRC-32 of the parameters' values, which calibration.yaml preserves bit by bit.
 [[nodiscard]] std::uint32_t calibration_check(const Calibration& calibration);
 
-// Pure. False: one line in *error. name: of the file, in errors.
+// Pure. False: one line in *error. name: of the file, in errors. load_map() also refuses a file of
+// more than 256 MiB.
 [[nodiscard]] bool parse_map(const std::string& bytes, const std::string& name,
                              const Calibration& calibration, MapContent* content,
                              std::string* error);

@@ -31,7 +31,7 @@ namespace alidade {
 // map itself, about 0.5 KB per landmark and per keyframe, plus 8 MB; pictures only on request.
 class SceneMapFile {
  public:
-  // Checks everything except the rows, which read() checks.
+  // Must come first. Checks everything except the rows, which read() checks.
   [[nodiscard]] bool open(const std::string& path, std::string* error);
 
   // As of the last open(), read() or update().

@@ -3,8 +3,8 @@
 // failure until it is asked for it; after a failure statements do nothing. So one check at the end
 // covers many steps. One thread at a time.
 // Changes go to a write-ahead log (NAME-wal, NAME-shm) or are unlogged. A rollback journal is never
-// written and never believed: a journal beside a database was put there by others, and SQLite would
-// delete the files that the journal names.
+// written and never believed: a journal next to a database was put there by others, and SQLite
+// would delete the files that the journal names.
 
 #include <cstddef>
 #include <cstdint>
@@ -28,8 +28,8 @@ class SqliteDatabase {
   SqliteDatabase() = default;
 
   // Opens an existing file; with `create` makes one if there is none. True: opened; only the first
-  // statement shows whether the file is a database. False also if there is a foreign_file_beside()
-  // it.
+  // statement shows whether the file is a database. A statement waits at most 2 s for other
+  // connections. False also if there is a foreign_file_beside() it.
   [[nodiscard]] bool open(const std::string& path, bool create);
   void close();
   [[nodiscard]] bool is_open() const { return handle_ != nullptr; }
@@ -99,7 +99,7 @@ class SqliteStatement {
 // Rolls back at its end unless it was committed.
 class SqliteTransaction {
  public:
-  // for_writing: nobody else can write until the end. Else all reads are of one moment.
+  // for_writing: no other connection can write until the end. Else all reads are of one moment.
   SqliteTransaction(SqliteDatabase* database, bool for_writing);
   ~SqliteTransaction();
   SqliteTransaction(const SqliteTransaction&) = delete;

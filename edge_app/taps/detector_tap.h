@@ -7,7 +7,7 @@
 //                                                            +--> capture thread
 //
 // Only frames in OE mode are handed over: detectors find motion by comparing pictures to a fraction
-// of a pixel, and telemetry alone is off by pixels at the long end of a zoom. The mailbox has one
+// of a pixel, and telemetry alone errs by pixels at the long end of a zoom. The mailbox has one
 // place. A picture that is not taken before the next one comes is replaced and counted. Three
 // frames in fixed memory change owner by one atomic exchange (a triple buffer), so the real-time
 // thread neither waits nor allocates. The picture is lent with its slot, not copied: its memory
@@ -69,7 +69,7 @@ class DetectorTap {
   [[nodiscard]] std::int64_t replaced() const { return replaced_.load(std::memory_order_relaxed); }
 
  private:
-  static constexpr unsigned kFresh = 4;  // flag beside the index of a frame: not taken yet
+  static constexpr unsigned kFresh = 4;  // flag, added to the index of a frame: not taken yet
 
   // Detector thread. Null if there is nothing new.
   [[nodiscard]] const DetectableFrame* take();

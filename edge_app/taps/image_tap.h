@@ -61,8 +61,7 @@ class ImageTap {
   // null.
   [[nodiscard]] std::shared_ptr<const LiveImage> of_frame(std::int64_t frame) const;
 
-  // Any thread but the real-time one. From now on nobody waits: all requests are answered with
-  // null.
+  // Any thread but the real-time one. From now on no request waits: each is answered with null.
   void close();
 
   // Real-time thread. True: the next frame with an image is wanted, and the caller has to push one.

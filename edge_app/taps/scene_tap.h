@@ -64,7 +64,7 @@ struct SceneTapOptions {
 
 class SceneTap {
  public:
-  // Borrows the locator.
+  // Borrows the locator: it must outlive this object.
   SceneTap(SceneLocator& locator, const SceneTapOptions& options);
 
   // Real-time thread, for each frame: whether its image is wanted. began_anew: the first frame of a

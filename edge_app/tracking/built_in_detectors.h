@@ -3,11 +3,11 @@
 // detector (person_detector.h) and the motion detector (motion_detector.h), in this order, on the
 // pictures of a DetectorTap. All boxes of a frame go to the TargetFeed together, as if a client had
 // sent them. If no detector could judge the picture, nothing is sent.
-// Scores become 0 to 1, but are no probabilities: of motion the share of the largest possible
-// score; of a person 1 / (1 + e^-s), s the distance from the SVM's plane. A box whose middle lies
-// in a box of an earlier detector is taken for the same thing and left out, and so are the last
-// boxes beyond tracking.max_detections. Memory is taken with the first picture; all others must
-// have its size. For the detector thread, except for report().
+// Scores become 0 to 1, but are no probabilities. The score of motion is its share of the largest
+// possible score. The score of a person is 1 / (1 + e^-s), s the distance from the SVM's plane. A
+// box whose middle lies in a box of an earlier detector is taken for the same thing and left out,
+// and so are the last boxes beyond tracking.max_detections. Memory is taken with the first picture;
+// all others must have its size. For the detector thread, except for report().
 
 #include <cstdint>
 #include <memory>
@@ -53,7 +53,7 @@ struct DetectorsReport {
 class BuiltInDetectors : public FrameDetector {
  public:
   // options: valid. plane: may be null without people. network: for options.onnx, else null.
-  // Borrows the feed.
+  // Borrows the feed: it must outlive this object.
   BuiltInDetectors(const BuiltInDetectorOptions& options,
                    std::shared_ptr<const PlaneEstimate> plane,
                    std::unique_ptr<NetworkDetector> network, TargetFeed& feed);

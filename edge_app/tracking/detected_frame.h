@@ -57,7 +57,7 @@ inline constexpr int kDetectionStatusCount = static_cast<int>(DetectionStatus::k
 
 // Why a box cannot be used. It is left out; the other boxes of the frame count. kBadScore: not 0 to
 // 1. kNoSize: width or height not above 0. kTooLarge: more than twice the picture's width or
-// height. kOutside: the box's middle is not in the picture. The first that holds.
+// height. kOutside: the box's middle is not in the picture. If several hold, the first counts.
 enum class BoxFault { kNotFinite, kBadScore, kNoSize, kTooLarge, kOutside };
 inline constexpr int kBoxFaultCount = static_cast<int>(BoxFault::kOutside) + 1;
 

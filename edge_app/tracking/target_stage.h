@@ -1,9 +1,9 @@
 #pragma once
 // TargetStage: makes targets from frames' detections. The frame's record, with camera and
 // orientation, gives each box its place (frame_view.h); the tracker does the rest
-// (core/tracking/target_tracker.h). A frame that is refused changes nothing. A box that cannot be
-// used (BoxFault), or has no place on the plane, is left out and counted. A frame may come late,
-// within history_s and history_frames. Deterministic. For one thread; allocates.
+// (core/tracking/target_tracker.h). A frame that is refused changes nothing but the counters. A box
+// that cannot be used (BoxFault), or has no place on the plane, is left out and counted. A frame
+// may come late, within history_s and history_frames. Deterministic. For one thread; allocates.
 
 #include <deque>
 #include <map>

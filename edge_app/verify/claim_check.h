@@ -2,11 +2,11 @@
 // Whether directions of one place, by two frames, differ by as much as their sigmas claim.
 //   y_p = mean of the residuals of pair p,  C_p = its covariance by both frames and the calibration
 //   ratio^2 = mean of y_p^T C_p^-1 y_p / 2
-// An error of the calibration counts by the difference of its effects on the two frames. Whether
-// those of two zooms are alike is not known: each is tried, and what claims most counts. Errors of
-// the two frames count as independent. Errors of a common map are not, which makes the ratio too
-// small, never too large. Pairs are correlated if they share frames, and by the calibration; with R
-// the correlations of all y_p, whitened pair by pair,
+// An error of the calibration counts by the difference of its effects on the two frames. It is not
+// known whether the errors of two zooms are alike: both cases are tried, and the one that claims
+// more counts. Errors of the two frames count as independent. Errors of a common map are not
+// independent, which makes the ratio too small, never too large. Pairs are correlated if they share
+// frames, and by the calibration; with R the correlations of all y_p, whitened pair by pair,
 //   freedom = (trace R)^2 / |R|^2       (Satterthwaite),   freedom * ratio^2 ~ chi-square
 // px, rad. Pure; allocates.
 

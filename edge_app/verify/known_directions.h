@@ -3,11 +3,11 @@
 // pixels of frames and where they look; here they are compared with what each mode says of them.
 //   r = the angle from the seen direction to the known one, to the right and up; of a horizon, up
 //   C = stated sigma^2 + what the frame and the calibration claim
-// The table's axes are those of the platform, but for a turn: stated, stated with a sigma, or
-// estimated. With W = the inverse of C's blocks, r^T W r / trace(W C) is the square of the ratio,
-// judged as in claim_check.h. Frames' errors may be alike or not, calibrations' of two zooms too:
-// of both the larger trace and the smaller freedom count. rad, px. Pure, but for the table.
-// Allocates.
+// The table's axes are those of the platform, but for a turn. The turn is stated, stated with a
+// sigma, or estimated. With W = the inverse of C's blocks, r^T W r / trace(W C) is the square of
+// the ratio, judged as in claim_check.h. It is not known whether the errors of all frames and zooms
+// are alike, or independent from frame to frame and from zoom to zoom. Both cases are tried; the
+// larger trace and the smaller freedom count. rad, px. Pure, but for the table. Allocates.
 
 #include <cstdint>
 #include <limits>
@@ -38,9 +38,8 @@ struct KnownLimits {
   std::vector<std::int64_t> frames;  // of the recording, ascending
 };
 
-// Reads DIRECTIONS.csv (docs/manual/how-to/know-that-it-is-right.md). False: *error is one line that
-// says what, where, and
-// what would be right.
+// Reads DIRECTIONS.csv (docs/manual/how-to/know-that-it-is-right.md). At most kMostKnownDirections.
+// False: *error is one line that says what, where, and what would be right.
 [[nodiscard]] bool read_known_directions(const std::string& path, const KnownLimits& limits,
                                          std::vector<KnownDirection>* out, std::string* error);
 

@@ -8,8 +8,8 @@
 //   s = Z^T C^-1 r,   V = Z^T C^-1 Z,   s^T V^-1 s ~ chi-square if a is 0           (score test)
 // The noise of the pictures is measured: by the residuals, and by the scatter of the pairs' parts
 // of s. Departures are found one after the other, the least probable first, until none is
-// improbable; of these the ones are kept that explain most for their number.
-// rad, s, px. Allocates.
+// improbable or four are found; of these the ones are kept that explain most for their number. rad,
+// s, px. Allocates.
 
 #include <array>
 #include <optional>
@@ -46,7 +46,8 @@ struct DepartureTest {
   int freedom = 0;        // how many of its numbers the recording shows; 0: none
   double chi_square = 0;  // with `freedom` degrees of freedom
   double log_chance = 0;  // natural; of so large a chi-square without this departure
-  // By which the variance grows, as the places of a pair share errors; chi_square is divided by it.
+  // Factor by which the variance grows, as the places of a pair share errors; chi_square is divided
+  // by it.
   double scatter = 1;
   // Size by this recording alone, and its sigma: px, 1, rad or s; of a curve at its knots, in the
   // order of `at`. Truth minus calibration; of gears and drifts of the zero: telemetry minus truth.
@@ -57,7 +58,8 @@ struct DepartureTest {
 
 struct ModelCheckResult {
   std::vector<DepartureTest> tests;  // of all departures, each by itself
-  // Of the departures that were found, each with the others free; the one that explains most first.
+  // Tests of the departures that were found, each with the others free; the one that explains most
+  // first.
   std::vector<DepartureTest> found;
   double noise_ratio = 1;  // residuals over the noise that alignment states; RMS
   int places = 0;          // that were compared

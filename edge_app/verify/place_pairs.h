@@ -24,8 +24,8 @@ struct PlacePair {
   std::vector<PlaceMatch> places;
 };
 
-// frames: by time. Each frame has a few partners, at all distances in time. A pair with fewer than
-// six places that agree is left out.
+// frames: by time. For each frame at most 8 partners are chosen, at all distances in time. In each
+// pair at most 24 places are looked for. A pair with fewer than six places that agree is left out.
 [[nodiscard]] std::vector<PlacePair> match_places(const std::vector<SeenFrame>& frames);
 
 }  // namespace alidade

@@ -22,9 +22,11 @@ namespace alidade {
 enum class Verdict {
   kHolds,         // no comparison contradicts the sigmas
   kContradicted,  // a comparison does, beyond chance
-  // Of claims: fewer than kReturnsLeast pairs or kLeastFreedom independent numbers. Of a departure:
-  // fewer pairs, nothing of it to be seen, or a test that would show only twenty times the claimed
-  // sigma. Of known directions: too few for the turn, or less than kLeastShare.
+  // A claim: there are fewer than kReturnsLeast pairs or kLeastFreedom independent numbers. A
+  // departure: there are fewer pairs, nothing of it can be seen, or the test finds nothing but
+  // would show only a departure of more than twenty times the claimed sigma. Known directions:
+  // there are too few for the turn, or they do not contradict and KnownResult::share is less than
+  // kLeastShare.
   kNotJudged
 };
 
@@ -56,7 +58,8 @@ struct KnownComparison {
   OrientationFrom from = OrientationFrom::kLandmarks;
   Verdict verdict = Verdict::kNotJudged;
   KnownResult result;
-  // Contradicted, but not once the platform's turn is estimated: by the heading alone, or in all.
+  // Set if the result is contradicted, but no longer once the platform's turn is estimated: the
+  // result with the heading estimated or, if that does not suffice, with all three angles.
   std::optional<KnownResult> turned;
   std::string sentence;  // the verdict in words
 };
@@ -75,7 +78,7 @@ struct VerifyInput {
 struct Verification {
   Verdict verdict = Verdict::kNotJudged;
   std::string sentence;                 // the verdict in words
-  std::vector<std::string> advice;      // what motion would serve
+  std::vector<std::string> advice;      // what motion would help
   int pairs = 0;                        // of pictures
   int places = 0;                       // see ModelCheckResult
   double noise_ratio = 1;               // see ModelCheckResult
@@ -90,7 +93,8 @@ struct Verification {
 
 // A comparison with fewer independent numbers, or fewer than kReturnsLeast pairs, is not judged.
 inline constexpr double kLeastFreedom = 12;
-// Known directions are not judged if less of their covariance is claimed by frames and calibration.
+// If frames and calibration claim a smaller share of their covariance, known directions can only
+// contradict: otherwise they are not judged.
 inline constexpr double kLeastShare = 0.1;
 
 [[nodiscard]] Verification verify(const VerifyInput& input);

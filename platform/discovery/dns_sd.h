@@ -29,7 +29,7 @@ struct DnsService {
 [[nodiscard]] std::string dns_sd_question(const std::vector<std::string>& types, std::uint16_t id);
 
 // False: not an answer to this question; *error says what is wrong. Services of other types are
-// left out.
+// left out, and whatever exceeds 64 services, 8 addresses of a service or 256 records of a section.
 [[nodiscard]] bool parse_dns_sd_answer(std::string_view datagram,
                                        const std::vector<std::string>& types, std::uint16_t id,
                                        std::vector<DnsService>* services, std::string* error);

@@ -1,7 +1,7 @@
 #pragma once
 // FoundDevices: the devices that answered a search, each once, however often and on however many
-// interfaces it answered, and the URL at which to ask it. No side effects. Bounded, whatever is
-// answered.
+// interfaces it answered, and the URL at which to ask it. No I/O. At most kMostDevices; further
+// ones are left out.
 //
 // Which of the reported URLs is best: one whose host is the address that the answer came from; then
 // IPv4, a name, IPv4 of 169.254, IPv6; of the same kind http before https, whose certificate
@@ -49,7 +49,7 @@ class FoundDevices {
 
   void add(const ProbeMatch& match, const AnswerOrigin& origin);
   void add(const DnsService& service, const AnswerOrigin& origin);
-  // By address.
+  // In order of their addresses.
   [[nodiscard]] std::vector<FoundDevice> list() const;
 
  private:

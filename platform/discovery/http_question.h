@@ -20,7 +20,7 @@ struct HttpQuestion {
   std::string password;
   LinkRules rules;
   double timeout_s = 5;
-  std::size_t most_bytes = std::size_t{512} << 10;  // of the answer
+  std::size_t most_bytes = std::size_t{512} << 10;  // of the answer; a longer one is an error
 };
 
 struct HttpReply {

@@ -17,7 +17,7 @@ struct VideoDevice {
   std::string error;  // why it cannot be used; one line
 };
 
-// Devices that only serve other purposes (metadata, encoders) are left out.
+// At most 256. Devices that only serve other purposes (metadata, encoders) are left out.
 [[nodiscard]] std::vector<VideoDevice> list_video_devices(const std::string& dev = "/dev");
 
 struct SerialPort {
@@ -27,7 +27,7 @@ struct SerialPort {
   std::string error;  // why it cannot be opened; one line
 };
 
-// Ports that no hardware is behind are left out.
+// At most 256. Ports without hardware behind them are left out.
 [[nodiscard]] std::vector<SerialPort> list_serial_ports(const std::string& dev = "/dev",
                                                         const std::string& sys = "/sys");
 

@@ -1,6 +1,6 @@
 #pragma once
-// ONVIF messages about a device and its video streams, beside those of onvif_messages.h: requests
-// as text, answers as values. No side effects.
+// ONVIF messages about a device and its video streams, in addition to those of onvif_messages.h:
+// requests as text, answers as values. No side effects.
 //   GetDeviceInformation          device service
 //   GetProfiles, GetStreamUri     media service (ver10: H.264, JPEG) and media2 (ver20: H.265, too)
 
@@ -29,11 +29,12 @@ constexpr OnvifCall kGetStreamUri2{kOnvifMedia2, "GetStreamUri"};
 // The address of the service media2 in the answer to GetServices; empty: it has none.
 [[nodiscard]] std::string parse_onvif_media2(std::string_view body);
 
-// The streams of the profiles that have video, of either service, without their URLs.
+// The streams of the profiles that have video, 64 at most, from the answer of media or media2,
+// without their URLs. A stream whose token exceeds 200 bytes is left out.
 [[nodiscard]] bool parse_onvif_streams(std::string_view body, std::vector<VideoStream>* streams,
                                        std::string* error);
 
-// The stream's URL as the device reports it.
+// The stream's URL as the device reports it, 2000 bytes at most.
 [[nodiscard]] bool parse_onvif_stream_url(std::string_view body, std::string* url,
                                           std::string* error);
 

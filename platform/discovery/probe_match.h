@@ -2,7 +2,7 @@
 // WS-Discovery (OASIS, the version of April 2005 that ONVIF prescribes): the question "which
 // devices are there?", sent to 239.255.255.250 and ff02::c, port 3702, and the answers. No side
 // effects: bytes in, values or a one-line error out. Anybody on the network can send an answer, so
-// it is bounded in every way and none of it is believed beyond "ask there".
+// its content is limited in number and length, and shows only where a device may be asked.
 
 #include <cstdint>
 #include <string>
@@ -19,7 +19,7 @@ inline constexpr const char* kWsDiscoveryGroup6 = "ff02::c";
 struct ProbeMatch {
   std::string endpoint;  // "urn:uuid:...": the device, whatever its addresses; empty: not given
   std::vector<std::string> types;  // without prefixes: NetworkVideoTransmitter
-  // Of its scopes, decoded; empty: not given.
+  // From its scopes, decoded; empty: not given.
   std::string name;
   std::string hardware;
   std::vector<std::string> addresses;  // URLs of its service, http:// or https://, as reported
@@ -31,7 +31,8 @@ struct ProbeMatch {
 [[nodiscard]] std::string probe_message(const std::string& message_id, bool for_cameras);
 
 // False: not an answer to one of our questions; *error says what is wrong. message_ids: of the
-// questions sent. An answer that names no question is accepted.
+// questions sent. An answer that names no question is accepted. Left out is whatever exceeds 16
+// devices, 64 types, scopes or addresses of a device, or 256 bytes for one of these.
 [[nodiscard]] bool parse_probe_matches(std::string_view datagram,
                                        const std::vector<std::string>& message_ids,
                                        std::vector<ProbeMatch>* matches, std::string* error);

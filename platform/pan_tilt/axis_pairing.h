@@ -9,7 +9,7 @@
 // Without interpolation pan and tilt would be half a cycle apart: 15 ms at 34 Hz, which no clock
 // offset can repair. The price: a sample comes half a cycle later. If both axes repeat their
 // previous reading (head at rest, or no new measurement in the device), the sample repeats too. No
-// side effects, no allocation; radians, and seconds of the host's CLOCK_MONOTONIC.
+// I/O, no allocation; radians, and seconds of the host's CLOCK_MONOTONIC.
 
 #include <optional>
 

@@ -7,7 +7,7 @@
 // verdict comes with the second advance of the device time. It is kUseless at once if a time is
 // missing, goes backwards or differs by more than kSlack_s; also if the second advance has not come
 // by the first answer that is the kAnswers-th or later and over kPatience_s after the first. A
-// verdict other than kOpen is final. No side effects; one thread.
+// verdict other than kOpen is final. No I/O; one thread.
 
 #include <cmath>
 #include <optional>

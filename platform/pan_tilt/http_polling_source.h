@@ -99,6 +99,7 @@ struct HttpPollingOptions : HttpDeviceOptions {
 // Everything that a source needs.
 struct HttpPollingPlan {
   HttpPollingOptions options;
+  // Not null unless `error` is set.
   std::unique_ptr<HttpConversation> conversation;
   std::string error;  // why no request can ever be made; empty if it can
 };

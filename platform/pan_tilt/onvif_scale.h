@@ -6,8 +6,7 @@
 // for the space, if it extends beyond -1..1: the user's angles are at its ends; without angles, pan
 // and tilt are degrees if these ranges can be nothing else; (4) -1..1 with the user's angles at its
 // ends, as in the standard. Errors: a position beyond its scale by more than 0.5 % of the scale's
-// length; a space that is neither generic nor degrees, if rules 1 and 3 do not apply. No side
-// effects.
+// length; a space that is neither generic nor degrees, if rules 1 and 3 do not apply. No I/O.
 
 #include <optional>
 #include <string>

@@ -7,9 +7,10 @@
 // GetConfigurationOptions) if OnvifScale needs it. Login: onvif_login.h.
 // device_time_s: UtcTime as Unix time, if it is useful (device_clock_trial.h). The first answers
 // are withheld until this is decided, so that all samples have a device time or none has.
-// kDisconnected and kFailed: http_polling_source.h. Here the former is also a SOAP fault, an HTTP
-// status other than 200, no position in the answer, and a position outside its scale. The latter is
-// also, before the first sample, wrong user or password, or a scale without angles.
+// kDisconnected and kFailed: http_polling_source.h. kDisconnected also after an answer of more than
+// 256 KiB, a SOAP fault, an HTTP status other than 200, an answer without a position, and a
+// position outside its scale. kFailed also, before the first sample, for a wrong user or password,
+// or a scale without angles.
 
 #include <memory>
 #include <optional>

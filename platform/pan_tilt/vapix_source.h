@@ -3,9 +3,10 @@
 //   GET /axis-cgi/com/ptz.cgi?query=position[&camera=N]
 // over one persistent HTTP connection with digest authentication (one 401 in total, not one per
 // poll), or basic where it is permitted and the only method offered (link_rules.h). Pace, stamps
-// and threads: http_polling_source.h. kDisconnected and kFailed: as there. Here the former is also
-// an HTTP status other than 200, an `Error:` answer, and an answer without a valid position. The
-// latter is also a URL with a path, and, before the first sample, wrong user or password (401).
+// and threads: http_polling_source.h. kDisconnected and kFailed: as there. kDisconnected also after
+// an answer of more than 4096 bytes, an HTTP status other than 200, an `Error:` answer, and an
+// answer without a valid position. kFailed also for a URL with a path and, before the first sample,
+// for a wrong user or password (401).
 
 #include <memory>
 #include <string>

@@ -4,7 +4,7 @@
 //   frames.csv       frame,receive_time_s[,sender_time_s][,sender_utc_s][,sequence][,restarted]
 //   telemetry.csv    receive_time_s,pan_rad,tilt_rad[,zoom][,device_time_s][,sequence]
 //                    [,earliest_time_s][,restarted]
-//   tracks.csv       frame,landmark,u_px,v_px,sigma_px   (in place of, or beside, the video)
+//   tracks.csv       frame,landmark,u_px,v_px,sigma_px   (in place of the video, or with it)
 // Times are seconds of one clock (the recording host's), angles are radians. A cell of an optional
 // column may be empty: the value is unknown. Unknown columns are ignored. Every line ends with a
 // newline, so that a file cut off in the middle of a number is not taken for a complete one. An

@@ -15,7 +15,7 @@ namespace alidade {
 class RecordingWriter {
  public:
   // Creates the directory if needed. width, height: px. False with one line in *error, also for a
-  // directory that already holds a file of a recording; what was made until then goes.
+  // directory that already holds a file of a recording; the files made until then are removed.
   [[nodiscard]] bool open(const std::string& directory, int width, int height,
                           const std::string& notes, std::string* error);
 

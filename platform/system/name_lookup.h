@@ -35,8 +35,8 @@ class NameLookup {
   [[nodiscard]] bool is_over() const { return errand_.is_over(); }
   // Readable when the look-up is over; negative: the look-up needed no thread.
   [[nodiscard]] int descriptor() const { return errand_.descriptor(); }
-  // When the look-up is over: the addresses, in the resolver's order. Empty: none, for the reason
-  // in *error.
+  // Once for each begin(), when the look-up is over: the addresses, in the resolver's order. Empty:
+  // none, for the reason in *error.
   [[nodiscard]] std::vector<HostAddress> take(std::string* error);
 
  private:

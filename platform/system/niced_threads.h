@@ -1,6 +1,6 @@
 #pragma once
-// NicedThreads: threads with normal scheduling policy, niced, with small stacks, whatever the
-// scheduling of the thread that starts them.
+// NicedThreads: threads with normal scheduling policy, a nice value of 10 and stacks of 512 KiB,
+// whatever the scheduling of the thread that starts them.
 
 #include <pthread.h>
 
@@ -9,7 +9,7 @@
 
 namespace alidade {
 
-// A thread like those of NicedThreads that nobody waits for. False: the system cannot start it.
+// Starts a thread like those of NicedThreads that is not joined. False: the system cannot start it.
 [[nodiscard]] bool start_detached_niced(std::function<void()> run);
 
 class NicedThreads {
@@ -21,7 +21,7 @@ class NicedThreads {
 
   // False: the system cannot start another thread.
   [[nodiscard]] bool start(std::function<void()> run);
-  // Waits for all of them to end.
+  // Waits for all threads to end. The destructor does the same.
   void join();
 
  private:

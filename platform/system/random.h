@@ -1,5 +1,5 @@
 #pragma once
-// Random bytes of the kernel, for nonces, tokens and names that nobody else may guess. Any thread.
+// Random bytes of the kernel, for nonces, tokens and names that must not be guessed. Any thread.
 // Both throw std::system_error if a filter of system calls forbids getrandom(2).
 
 #include <cstddef>
@@ -11,7 +11,7 @@ namespace alidade {
 // gathered enough.
 [[nodiscard]] std::string random_bytes(std::size_t count);
 
-// As many hexadecimal digits, in lower case. digits: 0 to 512 (more: 512).
+// Random hexadecimal digits, in lower case. digits: their number, 0 to 512 (more: 512).
 [[nodiscard]] std::string random_hex(std::size_t digits);
 
 }  // namespace alidade

@@ -42,11 +42,11 @@ struct RealtimeReport {
 
 // Locks all memory of the process, present and future. Keeps malloc from returning blocks below
 // kFetchedAlone to the kernel, as fresh memory costs a page fault. Pages in at once all data, this
-// program and the C and C++ libraries, except exception tables that lie among constants and program
-// code that no thread on a record's way enters (cmake/batch_code.ld). Excepted and later memory
-// stays once it was touched. Of other libraries (100 MB of codecs) only pages used from now on
-// stay; pages that only the loader needed are released. To be called before other threads start, or
-// their whole stacks are paged in.
+// program, and the C and C++ libraries. Exception tables among constants, and program code that no
+// thread on a record's way enters (cmake/batch_code.ld), stay once they are touched, and so does
+// later memory. In other libraries (100 MB of codecs) only pages that are used from now on stay;
+// pages that only the loader needed are released. To be called before other threads start, or their
+// whole stacks are paged in.
 inline constexpr std::size_t kFetchedAlone = std::size_t{512} << 10;  // bytes
 [[nodiscard]] RealtimeReport lock_process_memory();
 

@@ -45,7 +45,7 @@ class FrameSource {
   [[nodiscard]] virtual std::string name() const = 0;
 
   // One line for the user: what is awaited on an open connection, since when, and how to shorten
-  // the wait. Empty: nothing is awaited, or not for long. Thread-safe.
+  // the wait. Empty: nothing is awaited, or not for long yet (RTP: 3 s). Thread-safe.
   [[nodiscard]] virtual std::string waiting() const { return ""; }
 
   // One line for the user: a fault of a stream whose pictures do come, and how the fault was

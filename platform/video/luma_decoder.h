@@ -41,8 +41,9 @@ class LumaDecoder {
   [[nodiscard]] bool open(const AVCodecParameters& parameters, bool low_delay,
                           std::int64_t max_pixels = kMostFilePixels);
 
-  // Takes one whole picture, or null for the end of the stream. False: the data cannot be decoded.
-  // If keeps_too_many(), no later data can be either.
+  // Only after open() returned true, like receive(). Takes one whole picture, or null for the end
+  // of the stream. False: the data cannot be decoded. If keeps_too_many(), later data cannot be
+  // decoded, either.
   [[nodiscard]] bool send(const AVPacket* packet);
 
   // The next decoded picture; to be called until the result is kNone.

@@ -4,8 +4,8 @@
 // read() decodes. The first read() starts the thread, which inherits its scheduling.
 // receive_time_s: arrival of the first byte of the picture's part, headers included. Unlike the
 // arrival of the last byte, it does not depend on the picture's size. sender_time_s: the part's
-// X-Timestamp if it can be true (stamp_guard.h). Damaged pictures are skipped and counted; many in
-// a row end the connection. If the reader is too slow, the oldest waiting pictures are dropped and
+// X-Timestamp if it can be true (stamp_guard.h). Damaged pictures are skipped and counted; 30 in a
+// row end the connection. If the reader is too slow, the oldest waiting pictures are dropped and
 // counted. Sender clock, copies and statuses: docs/derivations.md.
 
 #include <cstddef>

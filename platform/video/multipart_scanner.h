@@ -40,8 +40,8 @@ class MultipartScanner {
   // Returns the next complete part, in order of arrival.
   [[nodiscard]] bool next(MultipartPart* part);
 
-  // Parts given up because they were longer than max_part_bytes, or had too many headers or headers
-  // without end.
+  // Parts given up because they were longer than max_part_bytes, or had more than 64 header lines
+  // or 8192 bytes of headers.
   [[nodiscard]] std::int64_t discarded() const { return discarded_; }
 
   // Bytes that must still come before a part can be complete, at least 1: the rest of the part's

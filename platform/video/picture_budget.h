@@ -14,7 +14,7 @@ namespace alidade {
 
 class PictureBudget {
  public:
-  // Bytes; libavcodec keeps up to 40 % more beside each picture.
+  // Bytes, of pictures alone; libavcodec keeps up to 40 % more for each picture.
   static constexpr std::int64_t kMost = 44 << 20;
 
   // Bounds this decoder. To be called before the decoder is opened.

@@ -1,5 +1,5 @@
 #pragma once
-// Remarks: notes of a source on its stream besides losses, each kind once. Thread-safe.
+// Remarks: notes of a source on its stream, other than losses, each kind once. Thread-safe.
 
 #include <cstdio>
 #include <deque>

@@ -43,20 +43,22 @@ struct AccessUnit {
 
 class RtpConnection {
  public:
-  // options.url must be without credentials. options and choice must outlive the connection.
+  // options.url must be without credentials. options and choice must outlive the connection, and
+  // options must not change.
   RtpConnection(const RtpSourceOptions& options, SenderChoice* choice);
   ~RtpConnection();
   RtpConnection(const RtpConnection&) = delete;
   RtpConnection& operator=(const RtpConnection&) = delete;
 
   // kOk, kStopped, or kDisconnected or kFailed with *error: one line without URL and password.
+  // read() only after open() returned kOk.
   [[nodiscard]] ReadStatus open(std::string* error);
   [[nodiscard]] ReadStatus read(AccessUnit* unit, std::string* error);
 
   // Thread-safe. Ends a wait; all later waits end at once.
   void interrupt() { transport_->interrupt(); }
 
-  // Of the open connection.
+  // Codec parameters of the open connection.
   [[nodiscard]] const std::shared_ptr<const AVCodecParameters>& parameters() const {
     return parameters_;
   }

@@ -41,7 +41,7 @@ class RtpTransport {
 
   virtual void interrupt() = 0;
 
-  // Of the open transport: SSRC of the packets to come, if the sender announced it.
+  // SSRC of the packets to come on the open transport, if the sender announced it.
   [[nodiscard]] virtual std::optional<std::uint32_t> agreed_source() const { return std::nullopt; }
   // Number of packets from others than the sender, which are left out, and a description of these
   // others.

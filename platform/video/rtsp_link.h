@@ -44,7 +44,8 @@ class RtspLink {
   [[nodiscard]] ReadStatus send(const std::string& text, double deadline_s, std::string* error);
   // Sends what fits at once, also after interrupt().
   void send_farewell(const std::string& text);
-  // Packets that come before the message are kept: early_packet().
+  // Packets that come before the message are kept, 4 MiB at most: early_packet(). Further ones are
+  // dropped.
   [[nodiscard]] ReadStatus next_message(double deadline_s, RtspMessage* message,
                                         std::string* error);
 

@@ -24,7 +24,7 @@ class RtspMessage;
 
 class RtspSession : public RtpTransport {
  public:
-  // options.url must be without credentials. options must outlive the session.
+  // options.url must be without credentials. options must outlive the session and must not change.
   explicit RtspSession(const RtpSourceOptions& options);
   ~RtspSession() override;
   RtspSession(const RtspSession&) = delete;

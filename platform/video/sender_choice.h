@@ -9,7 +9,8 @@
 //   kept      once a picture is decoded, for this connection, and for the next one unless its
 //             address was silent for timeout_s before. A new SSRC there is StreamFilter's matter.
 //
-// Packets of others are foreign. Outlives connections. Thread-safe.
+// Packets of others are foreign. At most kMostKnown senders are remembered at a time; further ones
+// are foreign and not tried. Outlives connections. Thread-safe.
 
 #include <sys/socket.h>
 
@@ -41,7 +42,7 @@ class SenderChoice {
   // True if another sender is to be tried, on a new connection; *error says so.
   [[nodiscard]] bool trial_is_over(double now_s, std::string* error) const;
 
-  // Number of the trial, for keep(). Each begin() counts on.
+  // Number of the trial, for keep(). Each begin() increases it.
   [[nodiscard]] int trial() const;
   // A picture of that trial was decoded: its sender is kept, if no other trial has begun.
   void keep(int trial);

@@ -16,10 +16,11 @@ using HttpAddress = boost::asio::ip::address_v6;
 [[nodiscard]] HttpAddress http_address(const boost::asio::ip::address& peer);
 
 // Limits the requests a second of all addresses together. All addresses that asked within the last
-// second have equal shares. At once an address may use its share of one second, or one request if
-// the share is less. It may use more while others leave more than half of a second's requests.
-// Beyond kMaxAddresses, all further addresses have one share together. As each new address may ask
-// once at once, a burst of new addresses may exceed per_s.
+// second have equal shares. An address may use its share of one second in a burst, or one request
+// if the share is less. It may use more while others leave more than half of a second's requests.
+// Beyond kMaxAddresses, all further addresses have one share together. The first request of an
+// address with a share of its own is always allowed, so many new addresses at the same time may
+// exceed per_s.
 class FairRate {
  public:
   // per_s: requests a second, more than 0.
@@ -84,7 +85,8 @@ class FairPlaces {
 
   // The holder of the place that may be taken away for the newcomer: the newest place of the
   // address that holds the most, if that address holds at least two more than the newcomer's. So
-  // nobody ends with fewer places than the newcomer. Null: there is none.
+  // the address that loses a place still has as many as the newcomer then has, or more. Null: there
+  // is no such place.
   [[nodiscard]] Holder* one_too_many(const HttpAddress& newcomer) const {
     const std::size_t most = largest_share();
     if (most < held_by(newcomer) + 2) return nullptr;

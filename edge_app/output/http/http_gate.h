@@ -74,8 +74,8 @@ class HttpGate {
   [[nodiscard]] HttpTickets& tickets() { return tickets_; }
 
   // Network thread. Whether a client may begin a TLS handshake: true if its address has some of its
-  // share left. Addresses that showed a token lately have shares of their own. Refusals are
-  // counted. now_s: s, monotonic, as in all functions here.
+  // share left. Addresses that showed a token within RecentAddresses::kRecentS have shares of their
+  // own. Refusals are counted. now_s: s, monotonic, as in all functions here.
   [[nodiscard]] bool may_shake_hands(const HttpAddress& address, double now_s);
 
   // Network thread. Returns the route that answers; null: *refusal is the answer. Sets token and

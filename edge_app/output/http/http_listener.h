@@ -23,7 +23,8 @@ namespace alidade {
 
 class HttpListener {
  public:
-  // options, *gate and *tally must outlive this object.
+  // options, *gate and *tally must outlive this object, and options must not change. Throws
+  // std::system_error if the system gives no eventfd.
   HttpListener(const HttpServerOptions& options, HttpGate* gate, HttpTally* tally);
   ~HttpListener();
   HttpListener(const HttpListener&) = delete;

@@ -46,7 +46,7 @@ struct ServerResponse {
 [[nodiscard]] ServerResponse http_page(const char* type, std::string body, const char* policy);
 
 // Handlers run on several threads at the same time and must not wait. An empty result: there is no
-// answer yet; the handler is called again some milliseconds later.
+// answer yet; the handler is called again 10 ms later.
 using HttpHandler = std::function<std::optional<ServerResponse>(const ServerRequest&)>;
 
 }  // namespace alidade

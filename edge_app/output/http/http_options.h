@@ -20,11 +20,13 @@ struct HttpLimits {
   // two more than the client's, that other address loses its newest and the client is served.
   int max_streams = 32;
   std::size_t max_head_bytes = 8192;
-  double head_timeout_s = 5;    // from the connection to the last byte of the head
-  double body_timeout_s = 10;   // from the last byte of the head to that of the body
-  double write_timeout_s = 10;  // without a byte taken by the client
-  // For all strangers together, and the same for all with a token; shared by their addresses. With
-  // TLS the same again for handshakes, of either group.
+  double head_timeout_s = 5;   // from the connection to the last byte of the head
+  double body_timeout_s = 10;  // from the last byte of the head to that of the body
+  // without a byte taken by the client; a finite answer must be taken within 60 s
+  double write_timeout_s = 10;
+  // Limit for all strangers together; the clients with a token have the same limit of their own.
+  // The addresses of a group share its limit. With TLS, handshakes have such a limit, too, for each
+  // of the two groups.
   double requests_per_s = 500;
 };
 

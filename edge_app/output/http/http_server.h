@@ -38,8 +38,9 @@ class HttpServer {
   // To be called before start(). True if certificate and key can be used, or none are configured.
   // False with one line in *error.
   [[nodiscard]] bool check_tls(std::string* error) const;
-  // Binds and listens; to be called once. False with one line in *error, or with an empty *error if
-  // `wait` gave up. `wait` is not called for a host that is an address.
+  // Binds and listens; to be called once. A host's name must be found within 5 s. False with one
+  // line in *error, or with an empty *error if `wait` gave up. `wait` is not called for a host that
+  // is an address.
   [[nodiscard]] bool start(const HttpStartWait& wait, std::string* error);
   // The same with a wait that never gives up.
   [[nodiscard]] bool start(std::string* error);

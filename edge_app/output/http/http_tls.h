@@ -1,8 +1,8 @@
 #pragma once
 // HttpTls: certificate and key of a server. They are read again when their files change, so that
 // they can be renewed without a restart. If the new files cannot be used, the old certificate and
-// key stay, and the failure is logged once. A failure counts only if it lasts, as one file is
-// replaced before the other.
+// key stay, and the failure is logged once. A failure counts only if the same files fail twice, at
+// least a second apart, as one file is replaced before the other.
 //
 // TLS 1.2 and later; no renegotiation, no compression, no session cache. For the network thread,
 // except load().
@@ -28,7 +28,7 @@ class HttpTls {
   // users can read.
   [[nodiscard]] bool load(std::string* error, std::vector<std::string>* warnings);
 
-  // The context for the next connection. Only after load().
+  // The context for the next connection. Only after load() returned true. now_s: s, monotonic.
   [[nodiscard]] std::shared_ptr<Context> context(double now_s);
 
  private:

@@ -4,8 +4,8 @@
 // Angles: a joint position turns about REP-103's axes (pan +z up, tilt +y left), Alidade's angle
 // the other way. Sign -1 therefore converts exactly; sign +1 is for drivers that count otherwise.
 // Times: see Stamps and docs/derivations.md. Not kept: sequence, restarted, sender_utc_s,
-// earliest_time_s, and files beside the tables. Errors are thrown as std::runtime_error with one
-// line.
+// earliest_time_s, and files other than the tables and pictures. Errors are thrown as
+// std::runtime_error with one line.
 
 #include <sensor_msgs/Image.h>
 

@@ -80,8 +80,8 @@ struct Axes {
 [[nodiscard]] geometry_msgs::TransformStamped plane_transform(const PlaneValues& plane,
                                                               const FrameNames& names);
 
-// R_base_from_camera, as x, y, z, w, at the exposure of row v, t = (v - reference_row) line_delay
-// later:
+// The record must have an orientation. R_base_from_camera, as x, y, z, w, at the exposure of row v,
+// t = (v - reference_row) line_delay later:
 //   R' = Exp(dpan a_pan) R  R_frd_from_rdf' Exp(dtilt a_tilt) R_frd_from_rdf,
 //   dpan = pan_rate t + pan_acceleration t^2 / 2, dtilt likewise (PTCEE 16, starting at R).
 [[nodiscard]] std::array<double, 4> orientation_of_row(const Record& record, const Axes& axes,

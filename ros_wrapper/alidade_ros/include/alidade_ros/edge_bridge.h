@@ -1,12 +1,12 @@
 #pragma once
 // EdgeBridge: the node and the nodelet. A client of one edge executable's HTTP API that publishes
 // its data in ROS conventions, stamped with capture times. Topics, services, parameters: README.md.
-// Threads: the event stream's publishes records. A second one polls once a second: the status, the
-// calibration if it changed, diagnostics, and whether the master still knows this node. roscpp
-// registers with a master once, so after a restart of the master all topics and services are
-// advertised anew. Services and detections run on the spinner's threads and wait for the edge 10 s
-// at most. Lock order: ports_mutex_, then mutex_. Service callbacks never take ports_mutex_, as
-// taking a service down waits for them.
+// Threads: the event stream's thread publishes records. A second thread polls once a second: the
+// status, the calibration if it changed, diagnostics, and whether the master still knows this node.
+// roscpp registers with a master once, so after a restart of the master all topics and services are
+// advertised anew. Services and detections run on the spinner's threads and give up if the edge
+// sends nothing for 10 s. Lock order: ports_mutex_, then mutex_. Service callbacks never take
+// ports_mutex_, as taking a service down waits for them.
 
 #include <alidade_msgs/Calibrate.h>
 #include <alidade_msgs/Detections.h>

@@ -27,7 +27,7 @@ namespace alidade_ros {
 
 class TargetReader {
  public:
-  // Keeps references to both.
+  // Keeps references to `target` and `clock`, which must outlive this object.
   TargetReader(const nlohmann::json& target, bool on_plane, const ClockMap& clock)
       : json_(target), on_plane_(on_plane), clock_(clock) {}
 
@@ -62,7 +62,7 @@ class TargetReader {
 
 class TargetListReader {
  public:
-  // Keeps references to all three.
+  // Keeps references to all three, which must outlive this object.
   TargetListReader(const nlohmann::json& list, const FrameNames& names, const ClockMap& clock)
       : json_(list), names_(names), clock_(clock) {}
 
