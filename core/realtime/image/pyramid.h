@@ -5,8 +5,9 @@
 // dropped. A point u of the image is exactly at u / 2^l of octave l, as pixel (i, j) covers [i,
 // i+1] x [j, j+1]. White noise of sigma grey levels becomes about sigma / 2^l. Each octave's
 // rounding adds a standard deviation of 0.3 and, as it rounds up, 1/8 of a grey level to the mean.
-// Octave 0 is the image itself, not a copy: the caller's memory must outlive its use. The
-// constructor takes all memory; build() allocates nothing and waits for nothing.
+// Octave 0 is the image itself, not a copy: the caller's memory must stay, unchanged, as long as
+// octave 0 is used. The constructor takes all memory; build() allocates nothing and waits for
+// nothing.
 
 #include <array>
 #include <cstdint>

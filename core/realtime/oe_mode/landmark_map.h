@@ -76,7 +76,7 @@ class LandmarkMap {
 
   // Usefulness, 0 to 1: high if the landmark is found when looked for. It falls with the time since
   // the last look, more slowly if the landmark was found often. A new landmark has 1/2 for 30
-  // frames, so that other new ones do not replace it.
+  // frames, so that other new ones do not replace it. occupied(slot).
   [[nodiscard]] double worth(int slot, std::uint32_t now) const;
 
  private:

@@ -59,8 +59,8 @@ struct OeStatistics {
   int found = 0;               // by patch alignment
   int inliers = 0;             // in agreement with the solution
   double coarse_shift_px = 0;  // px at the image's centre, correction by coarse alignment
-  // With kOk, at the middle row: what landmarks and telemetry show in the map's frame. Frames with
-  // the same `map` share that frame.
+  // Set with kOk, at the middle row: what landmarks and telemetry show in the map's frame. Frames
+  // with the same `map` share that frame.
   PanTilt<double> angle;                                            // rad, true, not wrapped
   PanTilt<double> rate;                                             // rad/s, true
   std::uint32_t map = 0;                                            // count of the maps so far
@@ -92,9 +92,9 @@ class OeMode {
   // The same with this map: made with this calibration, by this mount, with no restart since that
   // moved its zero. OE mode starts with its first frame. Invalid landmarks, and those without room,
   // are left out; an invalid map is ignored. Real-time safe: 0.3 us per landmark.
-  // A handed-over map is believed as far as images confirm it. It is forgotten if telemetry
-  // contradicts it for 50 frames. Landmarks that should be in view are forgotten if 50 frames show
-  // other things.
+  // A handed-over map is believed as far as images confirm it. MapUpkeepOptions say after how many
+  // frames it is forgotten because telemetry contradicts it, and after how many its unproven
+  // landmarks are, because images show other things.
   void reset(const Calibration& calibration, const MapState& map,
              FocalLength focal_length = FocalLength::kCalibrated);
 
@@ -106,7 +106,8 @@ class OeMode {
   //     If few hold, repeat 3 and 4 from where the previous frame leads.
   //   5 answer, and learn the map's offset                          map_offset_filter.h
   // frame_time_s: t0, row 0 on the image clock. at_middle_row: telemetry at t0 + clock_offset +
-  // line_delay * height / 2; null if there is none. The image must outlive the next maintain().
+  // line_delay * height / 2; null if there is none. The image must stay, unchanged, until the next
+  // maintain() returns.
   // *out is valid with every status but kNoPrediction and kNotFinite.
   // Extrapolated telemetry is a prior for this frame only: the map's offset does not learn from it,
   // and the frame becomes pending.
@@ -167,7 +168,7 @@ class OeMode {
   // finite; *out is then unchanged.
   [[nodiscard]] bool put_into_base(FrameOrientation* out) const;
 
-  // Of the last processed frame.
+  // Statistics of the last processed frame.
   [[nodiscard]] const OeStatistics& statistics() const { return statistics_; }
   // statistics().found observations. Residuals and inliers are the solution's or, without one, the
   // prediction's.
