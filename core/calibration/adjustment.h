@@ -34,7 +34,7 @@ class Adjustment {
   static constexpr Eigen::Index kLargestDirect = 900;
 
   // fixed: the parameters that are exact, by index in GlobalVector. largest_direct: rows of H, in
-  // place of kLargestDirect. The data must outlive this object. They must not change between a
+  // place of kLargestDirect. The data must outlive this object, and must not change between a
   // linearisation and the calls that take it.
   Adjustment(const AdjustmentData& data, const AdjustmentPriors& priors,
              const std::array<bool, kGlobalCount>& fixed,

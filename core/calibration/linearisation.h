@@ -196,7 +196,7 @@ struct TelemetryRow {
 void apply_step(const Eigen::VectorXd& x, const std::vector<Vector2<double>>& x_landmark,
                 AdjustmentState* state);
 
-// Forms the normal equations; one object for each thread. The data must outlive it. They must not
+// Forms the normal equations; one object for each thread. The data must outlive it, and must not
 // change between a linearisation and the calls that take it.
 class Lineariser {
  public:

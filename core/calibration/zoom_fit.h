@@ -64,10 +64,10 @@ struct ZoomFit {
 
 // calibrations: at two or more readings, each with its zoom, of one image size. All must take the
 // same parameters as exact: axes estimated with a free optical centre cannot be compared with axes
-// estimated with an exact one. False and one line in *error: calibrations that do not meet this, or more than
-// ZoomCurve::kMaxNodes; a covariance that is not positive definite; readings of two cameras (shared
-// parameters differ beyond chance); one reading with two focal lengths, or a focal length that is
-// not monotone in the reading. *fit then means nothing.
+// estimated with an exact one. False and one line in *error: calibrations that do not meet this, or
+// more than ZoomCurve::kMaxNodes; a covariance that is not positive definite; readings of two
+// cameras (shared parameters differ beyond chance); one reading with two focal lengths, or a focal
+// length that is not monotone in the reading. *fit then means nothing.
 [[nodiscard]] bool fit_zoom(const std::vector<Calibration>& calibrations,
                             const ZoomFitOptions& options, ZoomFit* fit, std::string* error);
 

@@ -100,7 +100,7 @@ class ClockFilter {
   //   step of the minimum delay, one-sided only
   //               See one_sided_clock.h. Flagged once; the line does not step.
   // Lost items are gaps in sender. Repeated and reordered items are answered, but do not move the
-  // line. With kOneSided they still count for jitter and steps.
+  // line. For kOneSided they still count for jitter and steps.
   ClockEstimate accept(double receive, double sender, const ClockRatePrior& prior) {
     return is_one_sided() ? accept(&one_sided_, receive, sender, prior)
                           : accept(&symmetric_, receive, sender, prior);

@@ -99,8 +99,8 @@ class CubicSpline {
     return control_points_[static_cast<std::size_t>(i)];
   }
 
-  // The same curve with one more knot in the middle of each given segment. Indices: 0 to
-  // segments() - 1, strictly increasing.
+  // The same curve with one more knot in the middle of each given segment. Indices: strictly
+  // increasing, from 0 to segments() - 1.
   [[nodiscard]] Derived split(const std::vector<int>& segments_to_split) const {
     Derived result = static_cast<const Derived&>(*this);
     result.insert_knots(segments_to_split);

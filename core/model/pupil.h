@@ -1,9 +1,10 @@
 #pragma once
 // The entrance pupil: where rays seem to enter the lens. Directions are seen from there, and the
-// base's origin is where pan and tilt axis meet. With the pupil at o a thing at the distance r,
-// both from the origin, is seen in the direction d_seen, and lies in the direction d:
+// base's origin is where pan and tilt axis meet. o is the pupil's place from the origin, in camera
+// axes (right, down, forward; m). A thing at the distance r from the origin lies in the direction d
+// and is seen in the direction d_seen:
 //   r d = R_base_from_camera o + t d_seen,   t > 0
-// Camera axes: right, down, forward; m. Far things need none of this. Pure; no allocation.
+// The two directions of a far thing are the same. Pure; no allocation.
 
 #include <cmath>
 #include <limits>

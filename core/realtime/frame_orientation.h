@@ -4,9 +4,9 @@
 //   direction = R_base_from_camera(angle + rate t + acceleration t^2 / 2) unproject(u),
 //   t = v * line_delay   (PTCEE 26, 27, and beyond)
 // Angles are TRUE (rad): measured ones without known errors, divided by the scales. Frames: base b
-// (FRD), camera c (RDF). An orientation is perturbed as R Exp(xi), xi in the camera frame (PTCEE 5). xi is
-// the error of directions in the image's middle: an error of the optical centre by c px counts as a
-// turn by c / f, with its correlation to the errors of the axes.
+// (FRD), camera c (RDF). An orientation is perturbed as R Exp(xi) (PTCEE 5), xi in the camera
+// frame. xi is the error of directions in the image's middle: an error of the optical centre by
+// c px counts as a turn by c / f, with its correlation to the errors of the axes.
 // Pixels are continuous; the centre of the top-left one is (0.5, 0.5). Covariances are first-order
 // and contain the calibration's. No allocation; plain values; any number of threads may read one.
 

@@ -19,9 +19,9 @@ inline constexpr int kMaxCoarsePatches = 256;
 
 struct CoarsePatch {
   const ReferencePatch* reference = nullptr;  // never null; must stay during align_coarsely()
-  int octave = 0;           // < Pyramid::octaves()
-  Vector2<double> u;        // px of the image, predicted
-  Matrix2<double> J_angle;  // px/rad, d u / d (pan, tilt)
+  int octave = 0;                             // < Pyramid::octaves()
+  Vector2<double> u;                          // px of the image, predicted
+  Matrix2<double> J_angle;                    // px/rad, d u / d (pan, tilt)
 };
 
 struct CoarseOptions {

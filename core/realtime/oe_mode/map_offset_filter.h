@@ -3,11 +3,11 @@
 // frames that wait for telemetry.
 //   base angle = map angle + offset
 // A frame with extrapolated telemetry waits until telemetry encloses its time; only then the filter
-// learns from it. Up to kMaxPending frames wait; one more drops the oldest. A frame counts
-// less if the same samples, landmarks or angles were used before (variance_inflation(),
-// offset_cells.h). A learnt focal length joins the filter: (offset, phi), see lens_scale.h. An
-// innovation that contradicts offset and landmarks is rejected. Fixed memory; no allocation. One
-// thread. Derivation: docs/oe_mode.md.
+// learns from it. Up to kMaxPending frames wait; one more drops the oldest. A frame counts less if
+// the same samples, landmarks or angles were used before (variance_inflation(), offset_cells.h). A
+// learnt focal length joins the filter: (offset, phi), see lens_scale.h. An innovation that
+// contradicts offset and landmarks is rejected. Fixed memory; no allocation. One thread.
+// Derivation: docs/oe_mode.md.
 
 #include <array>
 #include <cstddef>

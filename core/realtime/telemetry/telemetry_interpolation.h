@@ -20,8 +20,8 @@ struct TelemetryNoise {
   double pan_tilt_sigma = 1e-4;   // rad, white noise of one measured angle
   double resolution = 0;          // rad, smallest step of a measured angle; 0: none
   double period_sigma_s = 50e-6;  // s, of the time between two neighbouring samples
-  // rad/s^2, one standard deviation; acceleration expected of each axis if the samples do not
-  // show it: near a jerk, and with too few samples. Beyond the samples it is the lower limit of
+  // rad/s^2, one standard deviation; acceleration expected of each axis if the samples do not show
+  // it: near a jerk, and with too few samples. Beyond the samples it is the lower limit of
   // ExpectedAcceleration. 0: the mount keeps its rate.
   double acceleration_sigma = 0.1;
 
