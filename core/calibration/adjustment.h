@@ -34,7 +34,8 @@ class Adjustment {
   static constexpr Eigen::Index kLargestDirect = 900;
 
   // fixed: the parameters that are exact, by index in GlobalVector. largest_direct: rows of H, in
-  // place of kLargestDirect. The data must outlive this object.
+  // place of kLargestDirect. The data must outlive this object, and must not change between a
+  // linearisation and the calls that take it.
   Adjustment(const AdjustmentData& data, const AdjustmentPriors& priors,
              const std::array<bool, kGlobalCount>& fixed,
              Eigen::Index largest_direct = kLargestDirect)
@@ -97,7 +98,7 @@ class Adjustment {
   [[nodiscard]] const GlobalRows& global_rows() const { return global_rows_; }
   [[nodiscard]] const std::array<bool, kGlobalCount>& fixed() const { return fixed_; }
 
-  // Of all calls of minimise(), rejected steps included.
+  // Steps of all calls of minimise(), rejected ones included.
   [[nodiscard]] int steps_taken() const { return steps_taken_; }
 
  private:

@@ -3,7 +3,7 @@
 // is added. The axes' errors are expressed in the tangent basis of each calibration's own axes
 // (Parameter). This basis jumps where another coordinate axis becomes the least aligned one
 // (direction.h). Axes near those of the base are next to such a jump: two estimates of one head may
-// lie on either side of it. Pure; no allocation.
+// lie on different sides of it. Pure; no allocation.
 
 #include "core/model/calibration.h"
 #include "core/model/direction.h"

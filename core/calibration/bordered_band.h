@@ -5,8 +5,8 @@
 //   H = [ B   C^T ]   B: 2x2 blocks of control points up to kReach apart;  C, D: kBorder rows
 //       [ C    D  ]
 //
-// Only the lower triangle of B is stored. A dense H takes 8 bytes times the square of its rows: 3 MB
-// with 300 control points.
+// Only the lower triangle of B is stored. A dense H takes 8 bytes times the square of its rows:
+// 3 MB with 300 control points.
 
 #include <Eigen/Core>
 #include <algorithm>

@@ -36,10 +36,11 @@ using ParameterGoals = std::array<ParameterGoal, 4>;
 // The goals for this camera, without sigmas. camera: focal length and size > 0.
 [[nodiscard]] ParameterGoals calibration_goals(const Camera<double>& camera);
 
-// The goal whose sigma is the most times what is wanted; null: all are reached, or have no sigma.
+// The goal with the largest ratio of sigma to what is wanted, among those not reached; null: all
+// are reached, or have no sigma.
 [[nodiscard]] const ParameterGoal* farthest_goal(const ParameterGoals& goals);
 
-// Ranges of either axis, rad.
+// Ranges of one axis's motion, rad; the same for both axes.
 struct TravelLimits {
   double least = 0;  // less is refused
   double asked = 0;  // what is asked for where there was less than `least`

@@ -38,7 +38,7 @@ struct CalibrationNotes {
 //   focal_length: {value: 32008, sigma: 24}         and likewise every parameter
 //   pan_axis: {value: [0, 0, 1], sigma: [0, 0]}     unit vector; sigma in rad, in tangent_basis
 //   centre_offset: {value: [0, 0], sigma: [0, 0]}   optional: px, optical centre - image's middle
-//   zoom: 1234                                      optional; needed beside zoom_curve
+//   zoom: 1234                                      optional; needed with zoom_curve
 //   covariance: {names: [...], matrix: [[...]]}     optional; must agree with the sigmas to 0.1 %
 //   zoom_curve: {...}                               optional: other readings, zoom_text.h
 //   pan_error, pan_play_rad ...: {...}              optional: telemetry_error_text.h
@@ -46,7 +46,7 @@ struct CalibrationNotes {
 //   far_focal_length: {value: 10660, sigma: 4}      optional: px, of far things
 //   holds_beyond_m: 180                             optional: pupil.h
 //   quality: {...}                                  optional: residuals, counts, priors, advice
-//   landmarks: map.bin                              optional: file beside this one
+//   landmarks: map.bin                              optional: file in the same folder
 // False and one line in *error, in which `name` stands for the file; all else that is pointed to
 // stays. curve, telemetry_error, if not null: empty if the file has none.
 [[nodiscard]] bool parse_calibration(const std::string& text, const std::string& name,

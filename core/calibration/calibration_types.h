@@ -91,7 +91,7 @@ struct CalibrationOptions {
   Vector3<double> pan_axis = Vector3<double>::UnitZ();   // base; normalised before use
   Vector3<double> tilt_axis = Vector3<double>::UnitY();  // likewise
   double axis_sigma_rad = 0.05;  // of both axes, each tangent component; 0: known exactly
-  // The accuracy that the maker claims for the angles of either axis: one standard deviation of
+  // The accuracy that the maker claims for the angles of each axis: one standard deviation of
   // errors that vary slowly over the whole visited range. The recording cannot show such errors, as
   // they look like a scale. 0: no claim; the priors of the scales hold as they are.
   double angle_accuracy_rad = 0;
@@ -154,7 +154,7 @@ struct CalibrationExclusions {
   int observations_outside_image = 0;
   int observations_duplicate = 0;
   int observations_unknown_frame = 0;
-  int observations_of_single_landmarks = 0;  // a landmark seen once says nothing
+  int observations_of_single_landmarks = 0;  // a landmark seen once shows nothing
   int observations_outliers = 0;
   int observations_drifting = 0;  // of what drifts against the telemetry: clouds, water, traffic
   int telemetry_not_finite = 0;
@@ -208,8 +208,8 @@ struct CalibrationContradiction {
   double scatter = 1;     // of the parts' values, over the scatter that their noise explains
 };
 
-// A departure from the model that the residuals show beyond chance; beside one, also a "possible"
-// one that they do not exclude. The sigmas include its effect on the parameters.
+// A departure from the model that the residuals show beyond chance. If there is one, also a
+// "possible" one that they do not exclude. The sigmas include its effect on the parameters.
 struct CalibrationCause {
   std::string cause;  // "play of pan"
   double chi_square = 0;
@@ -238,7 +238,7 @@ struct CalibrationQuality {
   std::string weakest_direction;
   std::vector<std::string> advice;  // what motion or knowledge would help; also with kOk
   std::optional<CalibrationContradiction> contradiction;  // the worst
-  std::vector<CalibrationCause> causes;                   // the likeliest first
+  std::vector<CalibrationCause> causes;                   // likeliest first, "possible" last
 
   // One line for each contradiction and each likely cause.
   [[nodiscard]] std::vector<std::string> describe_departures() const;

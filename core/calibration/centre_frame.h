@@ -46,9 +46,9 @@ namespace internal {
 
 }  // namespace internal
 
-// Whether the data say more of the centre than the prior does, and chance would move the estimate
-// so far from the prior's centre in one of a thousand recordings only. prior: offset from the
-// image's middle, px. prior_sigma: px, of either component; 0: never.
+// Whether the data determine the centre better than the prior does, and chance would move the
+// estimate so far from the prior's centre in one of a thousand recordings only. prior: offset from
+// the image's middle, px. prior_sigma: px, of each component; 0: the result is false.
 [[nodiscard]] inline bool centre_is_shown(const Calibration& free, const Vector2<double>& prior,
                                           double prior_sigma) {
   constexpr double kLimit = 13.8;  // of chi-square with 2 degrees of freedom

@@ -56,7 +56,7 @@ template <int n>
 }
 
 // V after the data's information on the centre is divided by `growth` (less than 1 counts as 1).
-// The prior's information stays. prior_sigma: px, > 0, of either component; V, which includes this
+// The prior's information stays. prior_sigma: px, > 0, of each component; V, which includes this
 // prior, is smaller than prior_sigma^2.
 [[nodiscard]] inline Matrix2<double> grown_centre(const Matrix2<double>& V, double prior_sigma,
                                                   double growth) {

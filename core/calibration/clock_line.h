@@ -40,7 +40,7 @@ struct ClockLine {
   int lost = 0;               // ticks between the first and the last stamp that have no stamp
 };
 
-// With fewer than three stamps the clock is not steady.
+// A clock with fewer than three stamps is not steady.
 [[nodiscard]] ClockLine fit_clock_line(const ClockInput& input);
 
 }  // namespace alidade::internal

@@ -43,7 +43,7 @@ struct ContradictionCheck {
 };
 
 // The usual divisions of the frames' time span (s, image clock); none if it is empty. The
-// trajectory must outlive them.
+// trajectory must outlive them, and must not change.
 [[nodiscard]] std::vector<Division> usual_divisions(const TrajectorySpline& trajectory,
                                                     double begin_s, double end_s);
 
@@ -53,7 +53,7 @@ struct ContradictionCheck {
     const std::vector<Division>& divisions, const Adjustment& adjustment,
     const AdjustmentState& state, const Linearisation& at, const ReducedFactor& factor);
 
-// Of each parameter the largest growth beyond chance in any division, corrected for few parts.
+// For each parameter, the largest growth beyond chance in any division, corrected for few parts.
 // False alarms: 1 % for all divisions and parameters together.
 [[nodiscard]] ContradictionCheck check_contradictions(const std::vector<Division>& divisions,
                                                       const Adjustment& adjustment,

@@ -45,8 +45,8 @@ struct DepartureFit {
   [[nodiscard]] bool any() const;  // a part is present
 };
 
-// Log evidence that a part must gain to be present. Of recordings without any departure, chance
-// then shows a part in less than one of a hundred.
+// Log evidence that a part must gain to be present. Chance then shows a part in fewer than one of a
+// hundred recordings without any departure.
 inline constexpr double kLeastGain = 7;
 
 // R of one part, with its amplitude. rows: the size of c.

@@ -1,5 +1,5 @@
 #pragma once
-// DepartureScore: what the residuals at the minimum say of unknowns theta that the adjustment does
+// DepartureScore: what the residuals at the minimum show of unknowns theta that the adjustment does
 // not have. To first order theta adds X theta to the errors e; X has some columns for each row.
 //   score s = X^T e,   information N = X^T X - X^T J H^-1 J^T X
 // Trajectory, landmarks and parameters are eliminated: what they absorb does not count. The best
@@ -20,7 +20,8 @@ using DepartureEffect = Eigen::Matrix<double, kGlobalCount, Eigen::Dynamic>;
 
 class DepartureScore {
  public:
-  // columns: the size of theta. at: the minimum of least squares, which must outlive this object.
+  // columns: the size of theta. at: the minimum of least squares, which must outlive this object
+  // and must not change.
   DepartureScore(int columns, const Linearisation& at);
 
   // X: the row's columns first, first + 1, ...; its other columns are zero. Once for each row.

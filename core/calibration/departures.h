@@ -21,7 +21,8 @@ struct Departures {
   // found with the first one's unknowns free, and so on, up to four. False alarms: 1 % for all
   // together. "different distances" (depth_spread.h), tested separately, is the first or follows
   // these. If there is any cause, r^5 distortion is the last, as "possible", unless it is a cause
-  // already; its size is what the residuals leave open of the distortion that usual lenses have.
+  // already; its size is as much of the r^5 distortion of usual lenses as the residuals do not
+  // exclude.
   std::vector<CalibrationCause> causes;
   // To be added to the covariance of the parameters, scaled as in linearisation.h. error: squared
   // errors of the parameters due to the causes except different distances; parts of the recording

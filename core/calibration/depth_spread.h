@@ -12,7 +12,7 @@
 
 namespace alidade::internal {
 
-// With fewer than 20 landmarks that moved through the picture, all but `landmarks` is 0.
+// If fewer than 20 landmarks moved through the picture, all members but `landmarks` are 0.
 struct DepthSpread {
   // Natural logarithm of the chance of so large an excess without depth. 0: nothing is known.
   double log_chance = 0;

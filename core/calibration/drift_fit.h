@@ -41,9 +41,9 @@ class DriftFit {
     Eigen::MatrixXd cross;    // two rows for each of these, then those of the camera
   };
 
-  // Uses outliers, too: `used` of the data is changed during the call and restored. Of 60,000
-  // observations or more only those of every second frame are used, of 120,000 or more those of
-  // every third, and so on. state: near the minimum. Borrows nothing after the call.
+  // Uses outliers, too: `used` of the data is changed during the call and restored. From 60,000
+  // observations on, only those of every second frame are used; from 120,000 on, those of every
+  // third, and so on. state: near the minimum. Keeps no reference to the arguments.
   DriftFit(AdjustmentData* data, const AdjustmentState& state, Adjustment* adjustment);
 
   // Solves with these motions, one for each landmark. shared_rate: w_l of those with kShared. Then

@@ -23,7 +23,8 @@ enum class DriftFinding {
 
 struct DriftingTracks {
   DriftFinding finding = DriftFinding::kNone;
-  // By landmark; 1: with kGroup, it is not at rest, or may as well drift with the group.
+  // One for each landmark. 1, only with kGroup: it is not at rest, or it fits the drift of the
+  // group as well as rest.
   std::vector<char> drifts;
   int count = 0;                                   // of landmarks marked so
   Vector2<double> rate = Vector2<double>::Zero();  // of what drifts; meaningless with kNone

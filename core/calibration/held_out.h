@@ -16,7 +16,8 @@
 
 namespace alidade {
 
-// By CalibrationFrame::frame: when row 0 was exposed; s on the image clock, within the trajectory.
+// For each CalibrationFrame::frame, the time at which row 0 was exposed: s on the image clock,
+// within the trajectory.
 using FrameTimes = std::unordered_map<std::int64_t, double>;
 
 // result: of calibrate(), with kOk. Empty if nothing could be compared: an observation needs a

@@ -115,7 +115,7 @@ struct Linearisation {
   // The whole sum, priors included. An observation in use without projection counts with a large
   // constant.
   double cost = 0;
-  // False: an observation in use has no projection. With a finite LossScales::pixel always true.
+  // False: an observation in use has no projection. Always true if LossScales::pixel is finite.
   bool valid = true;
   std::vector<LinearisedResidual> observations;  // by index in AdjustmentData
   std::vector<LinearisedResidual> telemetry;     // likewise
@@ -196,7 +196,8 @@ struct TelemetryRow {
 void apply_step(const Eigen::VectorXd& x, const std::vector<Vector2<double>>& x_landmark,
                 AdjustmentState* state);
 
-// Forms the normal equations; one object for each thread. The data must outlive it.
+// Forms the normal equations; one object for each thread. The data must outlive it, and must not
+// change between a linearisation and the calls that take it.
 class Lineariser {
  public:
   Lineariser(const AdjustmentData& data, const AdjustmentPriors& priors,

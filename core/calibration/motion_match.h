@@ -27,7 +27,7 @@ struct ImageMotion {
 struct MotionMatch {
   double shift_s = 0;       // telemetry time = image time + shift_s
   double focal_length = 0;  // px
-  double correlation = 0;   // of the motions, 1 = perfect; 0: no match, shift and f say nothing
+  double correlation = 0;   // of the motions, 1 = perfect; 0: no match, shift and f mean nothing
   bool at_edge = false;     // the best shift is at an end of the range that was searched
   bool apart = false;       // at every shift fewer than half of the image's motions have telemetry
   double centre_s = 0;      // centre of the search

@@ -3,7 +3,7 @@
 //   sum |A^-1 (u - pi(R(p(t + v l))^T d; f, k, c at t + v l))|^2 / sigma_px^2
 // + sum |measured - scale p|^2 / sigma_rad^2           telemetry, unwrapped, with a robust loss
 // + sum |n_i|^2 / sigma_i^2
-// over splines of pan, tilt and log f (constant at either dwell), directions d (base), and n. n is
+// over splines of pan, tilt and log f (constant in each dwell), directions d (base), and n. n is
 // the difference of distortion and centre from the curve's, at places along the movement; sigma_i
 // is the curve's. A: as in linearisation.h, with f's rate in u'. Line delay, axes, scales, aspect
 // and clock offset are fixed. The loss of observations is robust first, then least squares on the
@@ -44,7 +44,8 @@ struct MovementData {
 // second dwell, log f of the control points between, n. Times on the image clock.
 class MovementAdjustment {
  public:
-  // curve: start values, distortion, centre and shared parameters. It must outlive this object.
+  // curve: not empty; start values, distortion, centre and shared parameters. It must outlive this
+  // object, and must not change.
   MovementAdjustment(MovementData data, const ZoomCurve& curve);
 
   // False and one line in *error: no landmark has a projection, too few tracks agree, or something
@@ -58,7 +59,7 @@ class MovementAdjustment {
   [[nodiscard]] double begin_s() const { return spline_.begin_s(); }
   [[nodiscard]] double end_s() const { return spline_.end_s(); }
 
-  // After run().
+  // After run(), as all below. log f at a time.
   [[nodiscard]] double log_f(double time_s) const { return spline_.value(basis(time_s))[2]; }
   // 1/s.
   [[nodiscard]] double log_f_rate(double time_s) const {

@@ -25,8 +25,8 @@ struct NoiseRatios {
   [[nodiscard]] bool known() const { return pixel.redundancy >= 10 && telemetry.redundancy >= 10; }
 };
 
-// Size of the residuals against the stated noise. Of m residuals with n unknowns, m - n degrees of
-// freedom remain (Helmert). telemetry_unknowns: the number of unknowns that telemetry determines,
+// Size of the residuals against the stated noise. m residuals with n unknowns leave m - n degrees
+// of freedom (Helmert). telemetry_unknowns: the number of unknowns that telemetry determines,
 // trace(H^-1 H_telemetry) (Adjustment::covariance()); the observations determine the others. at:
 // the minimum of least squares.
 [[nodiscard]] NoiseRatios noise_ratios(const AdjustmentData& data, const AdjustmentState& state,

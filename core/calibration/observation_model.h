@@ -16,7 +16,7 @@ using CameraJacobian = Eigen::Matrix<double, 2, kObservedCount>;
 // definite row.
 inline constexpr double kMaxRowSlope = 0.9;
 
-// Of one state, which must outlive it.
+// The model of one state, which must outlive it and must not change.
 struct ObservationModel {
   const Camera<double> camera;
   const Mechanics<double>& mechanics;

@@ -1,6 +1,6 @@
 #pragma once
 // Covariance to information and back. Some of the quantities may be exact, and the numbers may
-// differ by many orders of magnitude with their units (px beside s/row). Pure; allocates.
+// differ by many orders of magnitude with their units (px and s/row). Pure; allocates.
 
 #include <Eigen/Core>
 #include <vector>

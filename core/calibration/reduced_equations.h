@@ -26,9 +26,9 @@ using OrderedCholesky =
 
 class ReducedEquations {
  public:
-  // Multiplies every diagonal element of H and of the landmarks' blocks by 1 + damping. `in` is used
-  // by solve(): it must stay as it is until the next set(). False if a landmark's block or M is not
-  // positive definite; solve() must not be called then.
+  // Multiplies every diagonal element of H and of the landmarks' blocks by 1 + damping. `in` is
+  // used by solve(): it must stay as it is until the next set(). False if a landmark's block or M
+  // is not positive definite; solve() must not be called then.
   [[nodiscard]] bool set(const Linearisation& in, double damping);
 
   // The right-hand side with landmarks eliminated: g - Y y.

@@ -20,13 +20,13 @@ void set_telemetry_sigma(double white_sigma, double resolution, double stamp_sig
                          std::vector<AdjustmentTelemetry>* telemetry);
 
 // Removes the bias of rounding. While an axis moves by less than two steps from sample to sample,
-// rounding errors are not noise: the readings stay off to one side until the axis reverses. But
-// between two successive readings one step apart the axis passed their mean. This crossing is added
-// as a sample at the middle of their times; its sigma follows from the rate of `trajectory` (at
-// telemetry time - shift_s). Each of n equal readings in a row then has the sigma resolution
-// sqrt(n), which still holds an axis that nothing else holds. Nothing changes without a resolution,
-// for an axis without single steps, or if white_sigma is a quarter of the resolution or more.
-// source[i]: index of the sample of item i, of the first one for a crossing.
+// rounding errors are not noise: they keep their sign until the axis reverses. But between two
+// successive readings one step apart the axis passed their mean. This crossing is added as a sample
+// at the middle of their times; its sigma follows from the rate of `trajectory` (at telemetry time
+// - shift_s). Each of n equal readings in a row then has the sigma resolution sqrt(n), which still
+// holds an axis that nothing else holds. An axis without single steps stays as it is; so do both if
+// resolution is 0 or white_sigma is a quarter of it or more. telemetry: unwrapped, in order of
+// time. source[i]: index of the sample of item i, of the first one for a crossing.
 [[nodiscard]] std::vector<AdjustmentTelemetry> add_crossings(
     const std::vector<AdjustmentTelemetry>& telemetry, double resolution, double white_sigma,
     const TrajectorySpline& trajectory, double shift_s, std::vector<std::size_t>* source);

@@ -1,5 +1,5 @@
 #pragma once
-// By how much the parameters' variances grow because observations share errors.
+// How much the parameters' variances grow because observations share errors.
 //   z_c = sum of F_i e_i over the observations of a cluster c    F_i influence, e_i residual
 //   growth of parameter p = sum_c z_c,p^2 / E sum_c z_c,p^2      E for independent errors
 // Observations of one landmark share an error while its patch looks the same, and those of one

@@ -28,8 +28,9 @@ struct Adjusted {
 
 class StagedAdjustment {
  public:
-  // *selected must outlive this object. The adjustment removes drifting landmarks from it, sets
-  // outliers, noise and crossings, and subtracts departures from its telemetry.
+  // *selected must outlive this object, and only this object may change it: the adjustment removes
+  // drifting landmarks from it, sets outliers, noise and crossings, and subtracts departures from
+  // its telemetry.
   // nearness_sigma: of the prior of each landmark's nearness (AdjustmentState); 0: none has any.
   StagedAdjustment(const StartValues& start, const TelemetryAngleNoise& noise,
                    const CalibrationOptions& options, double nearness_sigma,

@@ -44,7 +44,8 @@ struct StartValues {
 
 // match: of find_motion(), ok. Removes observations, landmarks and telemetry samples outside the
 // other stream's span from *selected, and counts them in *excluded. Refuses (bad input) if fewer
-// than kMinLandmarks landmarks or 8 telemetry samples are left.
+// than kMinLandmarks landmarks are left, or if fit_telemetry() has no result for the samples that
+// are left. *start is incomplete after a refusal.
 [[nodiscard]] StageStatus start_values(const CalibrationInput& input,
                                        const CalibrationOptions& options,
                                        const RecordingClocks& clocks, const MotionMatch& match,

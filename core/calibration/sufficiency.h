@@ -16,8 +16,10 @@
 
 namespace alidade::internal {
 
-// kOk, or a refusal with its reason in *why. telemetry: measured angles over the telemetry clock.
-// match: of these two.
+// kOk, or a refusal with its reason in *why: kTooFewLandmarks (tracks too short), kNoMotion,
+// kOneAxisOnly, kConstantVelocity, kBadInput (degrees, or telemetry for less than half of the
+// video), kTelemetryMismatch. telemetry: measured angles over the telemetry clock. match: of these
+// two.
 [[nodiscard]] CalibrationStatus check_motion(const std::vector<ImageMotion>& motion,
                                              const TrajectorySpline& telemetry,
                                              const MotionMatch& match,
@@ -30,7 +32,7 @@ namespace alidade::internal {
 
 // The extent of a trajectory's motion, (pan, tilt).
 struct MotionExtent {
-  Vector2<double> range;         // rad, largest minus smallest, without 1 % of times at either end
+  Vector2<double> range;         // rad, largest minus smallest, without 1 % of times at each end
   Vector2<double> largest_rate;  // rad/s
   Vector2<double> varying_rate;  // rad/s, standard deviation of the rate
 };
@@ -39,8 +41,9 @@ struct MotionExtent {
 [[nodiscard]] MotionExtent measure_motion(const TrajectorySpline& trajectory,
                                           const std::vector<double>& times_s);
 
-// After fill_result(). Sets status and message; unless an axis is refused, also goals, condition
-// and weakest_direction, and adds to advice. motion: of the result's trajectory.
+// After fill_result(). Sets status and message: kOk, kWeak or, for a refused axis, kOneAxisOnly or
+// kTelemetryMismatch. Unless an axis is refused, also sets goals, condition and weakest_direction,
+// and adds to advice. motion: of the result's trajectory.
 void judge(const CalibrationOptions& options, const MotionExtent& motion,
            CalibrationResult* result);
 

@@ -1,11 +1,11 @@
 #pragma once
-// TelemetryDepartures: what telemetry reads beside the scaled angle, noise and steps, axis by axis:
+// TelemetryDepartures: what telemetry reads besides the scaled angle, noise and steps, by axis:
 //   measured = scale angle + g(angle) + play     (core/model/telemetry_error.h, play.h)
 // The values of g at its knots and the width of the play are linear parameters; they act on the
 // telemetry's residuals only. The evidence (departure_evidence.h) says whether they are present,
 // how large and how smooth. Their posterior mean is subtracted from the readings, and their
-// posterior covariance adds to the covariance of all parameters. If nothing is found and no
-// accuracy is claimed, nothing changes. Angles rad. Allocates. Derivation: docs/calibration.md.
+// posterior covariance adds to the covariance of all parameters. Angles rad. Allocates. Derivation:
+// docs/calibration.md.
 
 #include <Eigen/Core>
 #include <array>
@@ -21,8 +21,8 @@ namespace alidade::internal {
 
 class TelemetryDepartures {
  public:
-  // fixed: as given to Adjustment. resolution: the step of the readings; 0: none. accuracy: the standard
-  // deviation that the maker claims for each axis's angles; 0: no claim.
+  // fixed: as given to Adjustment. resolution: the step of the readings; 0: none. accuracy: the
+  // standard deviation that the maker claims for each axis's angles; 0: no claim.
   explicit TelemetryDepartures(const std::array<bool, kGlobalCount>& fixed, double resolution = 0,
                                double accuracy = 0)
       : fixed_(fixed), resolution_(resolution), accuracy_(accuracy) {}
@@ -32,7 +32,7 @@ class TelemetryDepartures {
   // `data`, robust or of least squares. choose: chooses the parts that are present; must be true in
   // the first call. Otherwise the parts stay, and only ripples are refined (departure_evidence.h).
   // False if no part is present and no accuracy is claimed, or if the normal equations have no
-  // solution.
+  // solution: the estimate is then not to be subtracted.
   [[nodiscard]] bool estimate(const AdjustmentData& data, const AdjustmentState& state,
                               const Linearisation& at, bool choose, Adjustment* adjustment);
 
@@ -47,13 +47,13 @@ class TelemetryDepartures {
   // To be called when the readings' sigmas in the data were multiplied by this.
   void scale_noise(double ratio);
 
-  // By how many standard deviations the latest estimate differs from what was subtracted before it.
+  // Difference of the latest estimate from what was subtracted before it, in standard deviations.
   [[nodiscard]] double change() const { return change_; }
   // The number of unknowns that the telemetry determines here.
   [[nodiscard]] double unknowns() const { return fit_.unknowns; }
   // To be added to the parameters' covariance; scaled as in linearisation.h.
   [[nodiscard]] const GlobalMatrix& covariance() const { return covariance_; }
-  // As estimated.
+  // The errors as last estimated.
   [[nodiscard]] TelemetryError error() const;
 
  private:
@@ -61,7 +61,7 @@ class TelemetryDepartures {
   static constexpr int kKinds = 2;
   static constexpr std::array<PlayKind, kKinds> kKind = {PlayKind::kMotor, PlayKind::kOutput};
 
-  // The part of the reading that is play, for either kind.
+  // The part of the reading that is play, for one kind of play.
   struct PlayColumn {
     double ahead = 0;   // rad, at the present width
     double slope = 0;   // d ahead / d width
@@ -91,7 +91,7 @@ class TelemetryDepartures {
   [[nodiscard]] Eigen::MatrixXd claim() const;
   // g of one axis as a straight line, rad over all knots, one standard deviation.
   void add_slope(int axis, double rise, Eigen::MatrixXd* root) const;
-  // Where g is a curve of no period, its bend tells little of its slope.
+  // Where g is a curve of no period, its bend hardly determines its slope.
   void add_possible_slopes(Eigen::MatrixXd* sure) const;
   // g of both axes may have a slope: the choice must not assume that the other axis has none.
   [[nodiscard]] Eigen::MatrixXd with_slopes(const Eigen::MatrixXd& sure) const;
@@ -101,7 +101,7 @@ class TelemetryDepartures {
   // If an axis has an error of some size, it may have play of that size, too. Slow movements do not
   // tell play from the clock offset.
   void add_possible_play(Eigen::MatrixXd* sure) const;
-  // Parts of c: for each axis a curve, ripples on its knots, then play of either kind.
+  // Parts of c: for each axis a curve, ripples on its knots, then play of each kind.
   [[nodiscard]] static std::size_t curve_part(int axis) {
     return static_cast<std::size_t>(axis * (1 + kRipples + kKinds));
   }

@@ -16,7 +16,7 @@
 
 namespace alidade::internal {
 
-// Throws YamlError. Of a key that is absent, the part of the result has exists() == false.
+// Throws YamlError. If a key is absent, its part of the result has exists() == false.
 [[nodiscard]] TelemetryError read_telemetry_error(const EstimateReader& file);
 // Writes the keys that are needed into a map.
 void write_telemetry_error(const TelemetryError& error, YAML::Emitter* out);

@@ -4,7 +4,7 @@
 //   1 Each calibration, without its priors, observes focal length, distortion and optical centre at
 //     its reading, and the parameters that all readings share.
 //   2 The likelihood chooses the curves' roughness q from a grid of factors about the usual value.
-//   3 Least squares with the curves as prior: one reading determines what another leaves open.
+//   3 Least squares with the curves as prior: what one reading does not determine, another may.
 //     Movements between the dwells add nodes of log f (movement_evidence.h).
 // Pure; allocates. Not for the real-time thread. Derivation: docs/calibration.md.
 
@@ -33,7 +33,7 @@ struct ZoomFitOptions {
   // used by this calibration.
   double centre_sigma_px = 0;
   double axis_sigma_rad = 0.05;
-  // Of a shared parameter except the axes, in its unit.
+  // Prior of a shared parameter except the axes, in its unit.
   struct Prior {
     Parameter parameter;
     double value;
@@ -55,19 +55,19 @@ struct ZoomFitOptions {
 
 struct ZoomFit {
   ZoomCurve curve;
-  // Of all calibrations against the curve; after extend_zoom(): of the difference between the
-  // shared parameters of curve and calibration.
+  // Chi-square of all calibrations against the curve; after extend_zoom(): of the difference
+  // between the shared parameters of curve and calibration.
   double chi_square = 0;
   int degrees_of_freedom = 0;  // of chi_square
   int node = 0;                // extend_zoom(): the node of the added calibration
 };
 
 // calibrations: at two or more readings, each with its zoom, of one image size. All must take the
-// same parameters as exact: axes beside a free optical centre cannot be compared with axes beside
-// an exact one. False and one line in *error: calibrations that do not meet this, or more than
-// ZoomCurve::kMaxNodes; a covariance that is not positive definite; readings of two cameras (shared
-// parameters differ beyond chance); one reading with two focal lengths, or a focal length that is
-// not monotone in the reading. *fit then means nothing.
+// same parameters as exact: axes estimated with a free optical centre cannot be compared with axes
+// estimated with an exact one. False and one line in *error: calibrations that do not meet this, or
+// more than ZoomCurve::kMaxNodes; a covariance that is not positive definite; readings of two
+// cameras (shared parameters differ beyond chance); one reading with two focal lengths, or a focal
+// length that is not monotone in the reading. *fit then means nothing.
 [[nodiscard]] bool fit_zoom(const std::vector<Calibration>& calibrations,
                             const ZoomFitOptions& options, ZoomFit* fit, std::string* error);
 

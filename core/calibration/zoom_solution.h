@@ -15,7 +15,7 @@ namespace alidade::internal {
 class ZoomSolution {
  public:
   // places: sample indices that are not exact. reference: the shared parameters are changes from
-  // it. reference and options must outlive this object.
+  // it. reference and options must outlive this object, and must not change.
   ZoomSolution(ZoomEvidence evidence, std::vector<int> places, const Calibration& reference,
                const ZoomFitOptions& options);
 

@@ -1,11 +1,11 @@
 #pragma once
 // ChangeRegions: from normalised differences z of each pixel (sigmas) to boxes of what has changed.
 //   S(u) = sum of z over the 5x5 pixels around u / its standard deviation in a still scene
-// Touching pixels with |S| >= threshold make a region. A box holds a region's pixels with |z| >=
-// 2.5 and at least a third of the region's largest |z|. Boxes are merged if they are nearer than
-// merge_px, or nearer than 3/4 of the smaller one's size and twice merge_px: farther apart they may
-// be two targets (target_pieces.h). Score: the largest |S|. z is limited to +-6 first, so that
-// single pixels make no region.
+// Touching pixels with |S| >= threshold make a region. A box holds a region's pixels with |z| of at
+// least 2.5 (or the region's largest |z|, if that is less) and at least a third of the largest.
+// Boxes are merged if they are nearer than merge_px, or nearer than 3/4 of the smaller one's size
+// and twice merge_px: farther apart they may be two targets (target_pieces.h). Score: the largest
+// |S|. z is limited to +-6 first, so that single pixels make no region.
 // The constructor takes all memory: 2 bytes a pixel for z, and kMostRuns runs. For one thread.
 
 #include <cstdint>

@@ -90,7 +90,7 @@ class CornerDistance {
   float middle_u_, middle_v_, scale_;
 };
 
-// warp: corners of columns x rows tiles (frame_warp.h). scratch: room for one float a tile. If no
+// warp: corners of columns x rows tiles (frame_warp.h). scratch: at least one element a tile. If no
 // sample is in the earlier image, samples is 0, and the rest is not to be used.
 [[nodiscard]] FrameMatch match_frames(const SmoothedView& now, const ImageView& then,
                                       const TileCorners& warp, int columns, int rows,

@@ -2,9 +2,9 @@
 // FrameWarp: where pixels of one frame are in an earlier frame, by both frames' orientations and
 // lenses, each pixel at its own row's time: u_then = pixel_then(direction_now(u_now)).
 // Computed exactly at nodes some 128 px apart; from the nodes interpolated cubically to the corners
-// of tiles of kTile x kTile pixels, and linearly within a tile. With 7 % distortion in the corner
-// and frames half an image apart the error is below 0.04 px (comparison_test). The constructor
-// takes all memory. One thread.
+// of tiles of kTile x kTile pixels, and linearly within a tile. The error is below 0.04 px for 7 %
+// distortion in the corner and frames half an image apart (comparison_test). The constructor takes
+// all memory. One thread.
 
 #include <vector>
 
@@ -32,7 +32,7 @@ class FrameWarp {
     return static_cast<std::size_t>(columns_ + 1) * static_cast<std::size_t>(rows_ + 1);
   }
 
-  // Sets the current frame. False: a node has no direction.
+  // Sets the current frame. False: a node has no direction; to() must then not be called.
   [[nodiscard]] bool look(const FrameOrientation& now);
   // Where the current frame's pixels are in an earlier frame; they may lie outside its image. out:
   // corners() elements. False: the direction of a node has no pixel in the earlier frame; *out is

@@ -3,8 +3,8 @@
 // pixel is compared with the same direction in two or three earlier images (earlier_frames.h,
 // frame_warp.h), after a common small shift and the light are estimated (frame_match.h):
 //   z(u) = (now - light then(warp(u) + shift) - offset) / sigma          sigma: DifferenceModel
-// Of a pixel's z the smallest in size counts, or 0 if they differ in sign. 5x5 pixels together
-// decide (change_regions.h). Method, reasons and limits: docs/motion_detection.md,
+// The smallest of a pixel's |z| counts, with its sign, or 0 if the signs differ. 5x5 pixels
+// together decide (change_regions.h). Method, reasons and limits: docs/motion_detection.md,
 // docs/derivations.md. The constructor takes all memory, some 12 bytes a pixel; find() allocates
 // nothing. Equal calls give equal results. For one thread.
 
@@ -115,7 +115,7 @@ class MotionDetector {
   ChangeRegions regions_;
   std::vector<DetectionBox> boxes_;
   bool first_ = true;
-  // Of the current picture.
+  // Data of the current picture.
   std::size_t smooth_pixels_;
   std::vector<std::uint16_t> smooth_;
   std::array<Compared, EarlierFrames::kMost> compared_;  // in the order of earlier_

@@ -4,9 +4,9 @@
 //   1 x (4 + C) x N   YOLOv8: centre u, v, width, height, C class scores
 //   1 x N x (5 + C)   YOLOv5: the same, and before the class scores their factor, objectness
 // The picture is scaled in proportion to fit into the input's middle; the rest is grey 114
-// (letterbox). All three channels are the grey levels, 0 to 1. Of overlapping boxes, of any class,
-// the surest stays (NMSBoxes). Takes scratch memory and threads as OpenCV does: not for the
-// real-time thread. For one thread.
+// (letterbox). All three channels are the grey levels, 0 to 1. The surest of overlapping boxes, of
+// any class, stays (NMSBoxes). Boxes are cut at the picture's border. Takes scratch memory and
+// threads as OpenCV does: not for the real-time thread. For one thread.
 
 #include <memory>
 #include <string>
@@ -32,16 +32,17 @@ struct NetworkOptions {
 enum class NetworkStatus {
   kOk,
   kNoImage,  // not valid, or stored bottom up
-  kFailed    // OpenCV could not run the network, or its output has another shape than at first
+  kFailed    // OpenCV could not run the network, or its output has another layout than at first
 };
 
 class NetworkDetector {
  public:
   // model: the bytes of a file. options must be valid. Runs once on an empty image. The output's
   // kind follows from N: v8 has one candidate for each cell of grids with strides 8, 16 and 32, v5
-  // has three. With another N, the larger dimension is taken for the candidates, the smaller one
-  // for the values. (An export with NMS, 1 x N x 6, looks like v5's.) Null and one line in *error:
-  // not an ONNX network, another input or output, boxes not in pixels, or labels of another number.
+  // has three. If N is another number, the larger dimension is taken for the candidates, the
+  // smaller one for the values. (An export with NMS, 1 x N x 6, looks like v5's.) Null and one line
+  // in *error: not an ONNX network, another input or output, boxes not in pixels, or labels of
+  // another number.
   [[nodiscard]] static std::unique_ptr<NetworkDetector> load(const std::string& model,
                                                              const NetworkOptions& options,
                                                              std::string* error);
@@ -50,7 +51,7 @@ class NetworkDetector {
   NetworkDetector& operator=(const NetworkDetector&) = delete;
 
   [[nodiscard]] NetworkStatus find(const ImageView& image);
-  // Of the latest picture, surest first; empty unless its status was kOk.
+  // Boxes of the latest picture, surest first; empty unless its status was kOk.
   [[nodiscard]] const std::vector<DetectionBox>& boxes() const { return boxes_; }
   [[nodiscard]] int classes() const;
 

@@ -52,9 +52,10 @@ class PersonDetector {
 
   [[nodiscard]] PersonStatus find(const ImageView& image, const FrameOrientation& frame,
                                   const WorldPlane& plane);
-  // For comparison: any height from least to most, in steps of 5 %, anywhere.
+  // For comparison: any height from least to most, in steps of 5 %, anywhere. kOk or kNoImage (not
+  // valid, or stored bottom up).
   [[nodiscard]] PersonStatus find_at_all_scales(const ImageView& image);
-  // Of the latest picture, surest first; empty unless its status was kOk.
+  // Boxes of the latest picture, surest first; empty unless its status was kOk.
   [[nodiscard]] const std::vector<DetectionBox>& boxes() const { return boxes_; }
 
  private:

@@ -2,8 +2,8 @@
 // What is known of the ground under a camera, for fit_plane() (plane_fit.h): any mix of data, each
 // with its errors. Directions are in the base frame, of unit length. Errors of different data are
 // independent, with one exception: sights from one picture share the error of its orientation, a
-// turn that is called the look. All sigmas > 0; exact values get a small one. m and rad. Allocates
-// (names).
+// turn that is called the look. All sigmas, heights and lengths are > 0; exact values get a small
+// sigma. m and rad. Allocates (names).
 
 #include <string>
 #include <utility>
@@ -63,7 +63,7 @@ struct PlaneEvidence {
   bool y_is_north = false;
 };
 
-// Of the camera above the plane.
+// Height of the camera above the plane, > 0.
 [[nodiscard]] inline PlaneDatum camera_height(double height_m, double sigma_m) {
   PlaneDatum out;
   out.kind = PlaneDatumKind::kHeight;
@@ -86,7 +86,7 @@ struct PlaneEvidence {
 // Pitch and roll of the base against gravity, see R_base_from_world_of(). sigma: of each.
 [[nodiscard]] PlaneDatum base_level(double pitch_rad, double roll_rad, double sigma_rad);
 
-// Of the base's forward direction, clockwise from Y of w.
+// Heading of the base's forward direction, clockwise from Y of w.
 [[nodiscard]] inline PlaneDatum base_heading(double heading_rad, double sigma_rad) {
   PlaneDatum out;
   out.kind = PlaneDatumKind::kHeading;

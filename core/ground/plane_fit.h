@@ -4,8 +4,9 @@
 // The covariance of (xi, p) is first order. It is multiplied by chi-square per degree of freedom if
 // this exceeds 1 beyond chance (1 in 1000). A misfit is sqrt(r^T Q^+ r / rank), Q the covariance of
 // the residual r after the fit (Baarda's data snooping); 1 is expected. With kMisfit, `worst` is
-// the datum without which the others agree best. If the data fit with either side up, as points of
-// the horizon do, the base's down axis is taken to point below the horizontal.
+// the datum without which the others agree best, among the eight with the largest r^T Q^+ r. If the
+// data fit with both sides up, as points of the horizon do, the base's down axis is taken to point
+// below the horizontal.
 
 #include <optional>
 #include <string>
@@ -19,7 +20,7 @@ namespace alidade {
 struct PlaneFitOptions {
   double gate_sigmas = 5;           // largest sqrt(r^T Q^+ r) of a datum; beyond it kMisfit
   double most_tilt_sigma = 0.1;     // rad; beyond this and the next two, kUndetermined
-  double most_heading_sigma = 0.2;  // rad
+  double most_heading_sigma = 0.2;  // rad; does not count with heading_of_base
   double most_height_share = 0.2;   // sigma of the height over the height
 
   // False if a limit is not above 0. *error then says so in one line; error must not be null.
@@ -28,7 +29,7 @@ struct PlaneFitOptions {
 
 enum class PlaneFitStatus {
   kOk,
-  kBadInput,       // such as a sigma not > 0, a direction not of unit length, or bad options
+  kBadInput,       // such as a sigma or length not > 0, a direction not of unit length, bad options
   kNoScale,        // nothing gives a length
   kUndetermined,   // see message
   kCameraOnPlane,  // the plane goes through the camera

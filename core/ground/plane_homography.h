@@ -60,14 +60,14 @@ namespace alidade {
 }
 
 // H_s: the similarity that takes two points of the rectified image to their places on the plane, m.
-// |to_b - to_a| is the known length. False if either pair coincides.
+// |to_b - to_a| is the known length. False if the two points of a pair coincide.
 [[nodiscard]] inline bool similarity(const Vector2<double>& from_a, const Vector2<double>& from_b,
                                      const Vector2<double>& to_a, const Vector2<double>& to_b,
                                      Matrix3<double>* H_s) {
   const Vector2<double> from = from_b - from_a;
   const Vector2<double> to = to_b - to_a;
   if (!(from.squaredNorm() > 0) || !(to.squaredNorm() > 0)) return false;
-  // As complex numbers: rotation and scale = to / from.
+  // Rotation and scale are to / from as complex numbers.
   const double real = from.dot(to) / from.squaredNorm();
   const double imaginary = (from.x() * to.y() - from.y() * to.x()) / from.squaredNorm();
   Matrix2<double> turn;
@@ -88,7 +88,7 @@ namespace alidade {
   return K * (K.transpose() * line);
 }
 
-// mu.
+// mu. camera_height_m: not 0.
 [[nodiscard]] inline double target_cross_ratio(double target_height_m, double camera_height_m) {
   return 1 - target_height_m / camera_height_m;
 }

@@ -17,14 +17,14 @@
 
 namespace alidade::internal {
 
-// Looks (plane_evidence.h) are unknowns beside the plane: turn = root z, z of unit variance, root
+// Looks (plane_evidence.h) are unknowns besides the plane: turn = root z, z of unit variance, root
 // root^T the look's covariance.
 struct PlaneState {
   WorldPlane plane;
   Eigen::VectorXd looks;  // z; three for each look
 };
 
-// With size 1 the second row is 0 and its variance is 1.
+// If size is 1, the second row is 0 and its variance is 1.
 struct DatumResidual {
   int size = 2;  // numbers in r: 1 or 2
   Vector2<double> r = Vector2<double>::Zero();
@@ -34,8 +34,9 @@ struct DatumResidual {
   Matrix2<double> covariance = Matrix2<double>::Identity();          // from the datum's own errors
 };
 
-// roots: of the looks' covariances. False: the datum is not defined on this plane, such as a foot
-// above the horizon.
+// roots: of the looks' covariances; every look of the datum must have one, and three elements of
+// state.looks. False: the datum is not defined on this plane, such as a foot above the horizon;
+// *out is then not to be used.
 [[nodiscard]] bool datum_residual(const PlaneDatum& datum,
                                   const std::vector<Matrix3<double>>& roots,
                                   const PlaneState& state, DatumResidual* out);

@@ -27,7 +27,7 @@ enum class PlaneFrame {
 };
 
 struct PlaneProblem {
-  const PlaneEvidence& evidence;       // borrowed
+  const PlaneEvidence& evidence;       // must outlive this object, and must not change
   std::vector<Matrix3<double>> roots;  // rad; square root of each look's covariance
   PlaneFrame frame = PlaneFrame::kCamera;
   int left_out = -1;  // a datum that is ignored; -1: none

@@ -87,8 +87,8 @@ struct PlanePoint {
                                       Vector2<double>* X, Matrix<double, 2, 3>* J_X_d = nullptr,
                                       Matrix<double, 2, kPlaneParameterCount>* J_X_plane = nullptr);
 
-// With cov_d, the covariance of the direction (rad^2, in tangent_basis(d_b)), and the plane's,
-// taken as independent.
+// The same with uncertainty. cov_d: covariance of the direction (rad^2, in tangent_basis(d_b)),
+// taken as independent of the plane's. d_b: unit length.
 [[nodiscard]] PlaneStatus plane_point(const WorldPlane& plane, const Vector3<double>& d_b,
                                       const Matrix2<double>& cov_d, const PlaneLimits& limits,
                                       PlanePoint* out);

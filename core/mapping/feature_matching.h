@@ -64,8 +64,8 @@ class FeatureIndex {
   [[nodiscard]] std::vector<FeatureMatch> match(const std::vector<Descriptor>& queries,
                                                 const MatchOptions& options = {}) const;
 
-  // As nearest_features(), except for neighbours that the trees miss. An index of fewer than two
-  // descriptors finds nothing. checks: as MatchOptions::checks.
+  // The same as nearest_features() of the index, except for neighbours that the trees miss. An
+  // index of fewer than two descriptors finds nothing. checks: as MatchOptions::checks.
   [[nodiscard]] std::vector<NearFeatures> nearest(const std::vector<Descriptor>& queries,
                                                   int checks) const;
 

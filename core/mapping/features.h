@@ -29,7 +29,7 @@ struct Feature {
 };
 
 struct FeatureSet {
-  std::vector<Feature> features;        // the strongest of each cell first
+  std::vector<Feature> features;        // the strongest of each cell, then the second ones, ...
   std::vector<Descriptor> descriptors;  // one for each feature, in the same order
 
   [[nodiscard]] std::size_t size() const { return features.size(); }

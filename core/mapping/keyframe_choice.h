@@ -39,7 +39,7 @@ struct SeenPlace {
 
 class KeyframeChoice {
  public:
-  // width, height: of the image, px.
+  // width, height: of the image, px. options: valid.
   KeyframeChoice(int width, int height, const KeyframeChoiceOptions& options = {})
       : width_(width), height_(height), options_(options) {}
 

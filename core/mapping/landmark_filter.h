@@ -32,7 +32,8 @@ struct LandmarkSight {
 };
 
 // u: where the picture shows the landmark, px. sigma_px: of each coordinate of u. d_b: the
-// landmark's direction before this picture, unit length.
+// landmark's direction before this picture, unit length. kBeyondDistortionLimit also if J_u_d B_d
+// has no inverse.
 [[nodiscard]] ProjectionStatus see_landmark(const PosedPicture& picture, const Vector2<double>& u,
                                             double sigma_px, const Vector3<double>& d_b,
                                             LandmarkSight* out);

@@ -1,12 +1,11 @@
 #pragma once
-// Localizer: where a picture looks, and with which f, by a scene map. With a hint that has
-// orientation and focal length, features are compared with the landmarks predicted near them.
-// Without such a hint, or if it leads to no pose, k-d trees over all landmarks' descriptors
-// retrieve keyframes. picture_pose.h finds the pose; a second pass uses all landmarks that should
-// be seen in this pose. The pose holds for the map's reference row. Details: docs/derivations.md.
-// Refuses what could be wrong: too few matches, too few that agree, two places that fit.
-// Repeated texture fails the ratio test or has a rival.
-// Batch work: allocates. One thread at a time.
+// Localizer: where a picture looks, and with which f, by a scene map. If a hint has orientation and
+// focal length, features are compared with the landmarks predicted near them. Without such a hint,
+// or if it leads to no pose, k-d trees over all landmarks' descriptors retrieve keyframes.
+// picture_pose.h finds the pose; a second pass uses all landmarks that should be seen in this pose.
+// The pose holds for the map's reference row. Details: docs/derivations.md. It refuses what could
+// be wrong: too few matches, too few that agree, two places that fit. Repeated texture fails the
+// ratio test or has a rival. Batch work: allocates. One thread at a time.
 
 #include <memory>
 #include <optional>
@@ -25,7 +24,7 @@ enum class LocalizationStatus {
   kNoUsablePicture  // fewer than least_features
 };
 
-// As records and commands name it: "ok", "not in the map", "ambiguous", "no usable picture".
+// The name in records and commands: "ok", "not in the map", "ambiguous", "no usable picture".
 [[nodiscard]] const char* to_string(LocalizationStatus status);
 
 // Options of the features to localize with. They are found fast: the picture is shrunk by 2, with a
@@ -40,14 +39,13 @@ struct LocalizationOptions {
   int tried_keyframes = 4;    // the most like the picture, one after another
   double threshold_px = 6;    // of an inlier of the first pose
   int least_inliers = 15;     // matches that agree on the pose
-  // Of the matches near their landmarks' predicted places, the least share that must agree on the
-  // pose.
+  // Least share of the matches near their landmarks' predicted places that must agree on the pose.
   double least_share = 0.25;
   double near_px = 6;  // search radius around a landmark's place by the first pose
   // Largest distance of two descriptors of one thing; the largest possible distance is 512.
   double most_distance = 260;
-  // How far the lens may be off its curve between the zooms of the keyframes, for each unit of log
-  // f from the nearest one: sigma of log f, and of the optical axis.
+  // How far the lens may depart from its curve between the zooms of the keyframes, for each unit of
+  // log f from the nearest one: sigma of log f, and of the optical axis.
   double between_log_f = 2e-3;
   double between_px = 2;
   // Least ratio of a feature's size to the size that its landmark should have there; the inverse is
@@ -77,8 +75,8 @@ struct Localization {
   LocalizationStatus status = LocalizationStatus::kNoUsablePicture;
   PicturePose pose;  // with kOk; its covariance includes the map's
   int matches = 0;   // number that agree on the pose
-  // With kOk: these matches, and the pose's covariance against their landmarks alone, without the
-  // landmarks' common errors.
+  // Set with kOk: these matches, and the pose's covariance against their landmarks alone, without
+  // the landmarks' common errors.
   std::vector<LocalizedFeature> matched;
   Matrix4<double> covariance_in_map = Matrix4<double>::Zero();
   int expected = 0;           // landmarks that should be seen
@@ -88,7 +86,7 @@ struct Localization {
 
 class Localizer {
  public:
-  // Copies what it needs of the map.
+  // map: valid (is_valid()). Copies what it needs of the map.
   explicit Localizer(const SceneMap& map, const LocalizationOptions& options = {});
   ~Localizer();
   Localizer(Localizer&&) noexcept;

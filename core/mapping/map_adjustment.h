@@ -19,13 +19,13 @@ namespace alidade {
 
 struct OrientationPrior {
   Matrix3<double> R_base_from_camera = Matrix3<double>::Identity();
-  // Of xi in R Exp(xi), rad^2; positive definite.
+  // Covariance of xi in R Exp(xi), rad^2; positive definite.
   Matrix3<double> covariance = Matrix3<double>::Identity();
 };
 
 struct MapPicture {
   double position = 0;  // s of the lens curve: log f by the zoom reading
-  // Of log f about the curve: the zoom's repeatability, or the uncertainty of s. > 0.
+  // Sigma of log f about the curve: the zoom's repeatability, or the uncertainty of s. > 0.
   double eps_sigma = 1e-3;
   PictureMotion motion;
   Matrix3<double> R_start = Matrix3<double>::Identity();  // start value of R_base_from_camera

@@ -48,7 +48,9 @@ struct MapBuildOptions {
   // Sigma of the optical centre about the image's middle, as a share of the width.
   double centre_share = 0.01;
   LinkOptions links;
-  MapOptions adjustment;     // its lens is set by the builder
+  // The builder sets its lens, its start and the level sigmas of the centre. If it searches a focal
+  // length, the level sigma of delta is at least 0.15.
+  MapOptions adjustment;
   int first_features = 150;  // of each picture, for the first adjustment
   // Second adjustment: matches must agree within gate_px or gate_sigmas, whichever is larger.
   double gate_px = 1.5;
@@ -66,7 +68,8 @@ enum class MapBuildStatus {
   kOk,
   kBadInput,   // options that validate() refuses, or fewer than two pictures
   kNoTexture,  // fewer than two pictures with enough features
-  // Only some pictures have log_f; none has it and no focal length fits; or one is off the lens.
+  // Only some pictures have log_f; none has it and no focal length fits; or one lies outside the
+  // range of options.lens.
   kNoFocalLength,
   kNotConnected,   // see MapBuild::groups
   kNotDetermined,  // the adjustment found no minimum

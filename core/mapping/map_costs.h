@@ -18,8 +18,8 @@ class SeenCost
     : public ceres::SizedCostFunction<2, kPictureBlock, 2, kLensQuantityCount, kLensQuantityCount,
                                       kLensQuantityCount, kLensQuantityCount, 1> {
  public:
-  // All arguments except the observation must outlive this object. Only knots, image size and
-  // aspect of the lens are used, not its control points.
+  // All arguments except the observation must outlive this object, and must not change. Only knots,
+  // image size and aspect of the lens are used, not its control points, which may change.
   SeenCost(const MapPicture* picture, const LensCurve* lens, const Vector3<double>* d_start,
            const MapObservation& seen);
   bool Evaluate(double const* const* parameters, double* residuals,

@@ -3,8 +3,8 @@
 // covariances. A landmark is a track with two or more observations that the adjustment kept, or a
 // single feature that is in no track, or that the adjustment left out of its track. A landmark's
 // own covariance comes from its observations, in tangent_basis(d_b). Its common covariance comes
-// from pose and f of the keyframe in which its direction is known best. Base frame, rad and px.
-// Batch work: allocates.
+// from pose and f of the keyframe in which its direction is known best. A landmark that is_valid()
+// refuses is left out. Base frame, rad and px. Batch work: allocates.
 
 #include <optional>
 #include <vector>

@@ -28,7 +28,7 @@ struct LinkedPicture {
 
 struct LinkOptions {
   double ratio = 0.8;              // as MatchOptions::ratio
-  int most_partners = 12;          // of each picture
+  int most_partners = 12;          // that each picture asks for; others may ask for it, too
   double most_log_f_off = 1.2;     // of two pictures; beyond, few features have a size seen in both
   double threshold_share = 0.008;  // of the image's width; how far distortion may move a match
   int least_inliers = 12;          // of a link
@@ -42,10 +42,10 @@ struct PictureLink {
   int a = 0;
   int b = 0;
   std::vector<FeatureMatch> matches;  // query: feature of b; indexed: of a
-  // By check_link(): find_pose()'s; or kTooFewMatches with fewer than least_inliers, kRival if
-  // telemetry contradicts the pose.
+  // Set by check_link(): find_pose()'s status; or kTooFewMatches with fewer than least_inliers,
+  // kRival if telemetry contradicts the pose.
   PoseStatus status = PoseStatus::kTooFewMatches;
-  // With kOk:
+  // The next two are set with kOk only.
   std::vector<int> inliers;  // of matches
   Matrix3<double> R_a_from_b = Matrix3<double>::Identity();
 };
@@ -59,7 +59,8 @@ void check_link(const std::vector<LinkedPicture>& pictures, const LensCurve& len
                 const LinkOptions& options, PictureLink* link);
 
 // The common focal length (log f, f in px) with which the matches of these links fit best, for
-// pictures of one lens that did not zoom. Empty if no link fits with 0.4 to 12 image widths.
+// pictures of one lens that did not zoom. Only the eight links with most matches are tried. Empty
+// if none of them fits with 0.4 to 12 image widths.
 [[nodiscard]] std::optional<double> common_focal_length(const std::vector<LinkedPicture>& pictures,
                                                         const std::vector<PictureLink>& links,
                                                         int width, int height,

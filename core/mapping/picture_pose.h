@@ -1,9 +1,9 @@
 #pragma once
 // find_pose(): where a picture looks, and with which f, from matches of its features with
-// directions of the map. Unknowns: R_base_from_camera at the reference row, and log f. With a mount
-// only pan and tilt turn the camera (mechanics.h); without, the rotation is free. The motion during
-// the read-out (map_projection.h) is known, or is estimated with a prior: the picture shows it, as
-// its rows are exposed one after another.
+// directions of the map. Unknowns: R_base_from_camera at the reference row, and log f. If the mount
+// is known, only pan and tilt turn the camera (mechanics.h), else the rotation is free. The motion
+// during the read-out (map_projection.h) is known, or is estimated with a prior: the picture shows
+// it, as its rows are exposed one after another.
 // The covariance grows if residuals exceed their sigmas. Refuses what could be wrong, see
 // PoseStatus. Equal input gives equal results. Allocates; no shared state. Method:
 // docs/derivations.md.
@@ -33,8 +33,8 @@ struct FocalLengthPrior {
 };
 
 // Uncertainty of a motion: sigmas of the change during the read-out of all rows. 0: known.
-// Infinity: unknown; the motion is then limited to some image widths a second, faster than any
-// camera.
+// Infinity: unknown; the motion is then limited to some image widths a second, which is faster than
+// heads turn.
 struct MotionDoubt {
   double turn = 0;   // rad, of each of the mount's axes
   double log_f = 0;  // of log f's change
@@ -44,7 +44,7 @@ inline constexpr MotionDoubt kUnknownMotion{std::numeric_limits<double>::infinit
 
 // Prior knowledge of the picture.
 struct PoseKnowledge {
-  LensCurve lens;
+  LensCurve lens;        // with segments and an image size
   PictureMotion motion;  // the mean; with a line delay of 0 a camera at rest
   MotionDoubt motion_doubt;
   std::optional<PictureMotion> motion_start;  // start of the search, as PicturePose::motion
@@ -59,10 +59,10 @@ struct PoseKnowledge {
 struct PoseOptions {
   int max_trials = 2000;    // number of pairs of matches that are tried
   double threshold_px = 3;  // of an inlier of a pose from two matches
-  // Of an inlier of the adjusted pose, in its sigmas times the noise that was found.
+  // Gate of an inlier of the adjusted pose, in its sigmas times the noise that was found.
   double gate_sigmas = 4;
   double roll_tolerance = 0.05;  // rad; error of the mount's roll due to the noise of two matches
-  int least_inliers = 8;
+  int least_inliers = 8;         // less than 2 counts as 2
   double least_spread = 0.03;  // rms of the inliers along their narrow side, over the image's width
   // Limit of log10 of the expected number of poses with as many inliers by chance.
   double most_chance_log10 = -6;
@@ -91,13 +91,13 @@ struct PicturePose {
   PoseStatus status = PoseStatus::kTooFewMatches;
   Matrix3<double> R_base_from_camera = Matrix3<double>::Identity();
   double log_f = 0;
-  // Of xi in R Exp(xi) (camera frame, rad) and log f.
+  // Covariance of xi in R Exp(xi) (camera frame, rad) and log f.
   Matrix4<double> covariance = Matrix4<double>::Zero();
   Camera<double> camera;                 // of log_f
   std::optional<PanTilt<double>> angle;  // true angles, rad; with a mount
   // The known motion; if it was estimated, in heights (picture_motion.h).
   PictureMotion motion;
-  // Of w and zoom rate of `motion`; 0 if the motion was known.
+  // Covariance of w and zoom rate of `motion`; 0 if the motion was known.
   Matrix4<double> motion_covariance = Matrix4<double>::Zero();
   std::vector<int> inliers;  // indices of matches, increasing
   double noise_scale = 0;    // rms of the residuals in their sigmas

@@ -45,7 +45,7 @@ struct PoseFit {
                               const std::vector<int>& inliers, const PoseKnowledge& knowledge,
                               const PoseState& state);
 
-// Those of the candidates (indices of matches) whose residuals lie within gate_sigmas.
+// The candidates (indices of matches) whose residuals lie within gate_sigmas.
 [[nodiscard]] std::vector<int> within_gate(const std::vector<PoseMatch>& matches,
                                            const std::vector<int>& candidates,
                                            const PoseKnowledge& knowledge, const PoseState& state,

@@ -4,7 +4,8 @@
 //              and its origin. log f = s + delta(s) + eps (lens_curve.h), s its position.
 //   landmark   a thing that can be recognised: direction in base, appearance, size, history
 //   sighting   where a keyframe sees a landmark
-// Ids increase and are never reused. Times are UTC seconds since 1970. Only the vectors allocate.
+// Ids increase, up to 2^53, and are never reused. Times are UTC seconds since 1970, up to 1e11.
+// Only the vectors allocate.
 
 #include <Eigen/Geometry>
 #include <cstddef>
@@ -63,19 +64,19 @@ struct SceneLandmark {
   // own parts; the common part is added to the pose's covariance.
   Matrix2<double> covariance = Matrix2<double>::Zero();         // own part
   Matrix2<double> shared_covariance = Matrix2<double>::Zero();  // common part
-  double scale_rad = 0;        // sigma of the blob as an angle; > 0
+  double scale_rad = 0;        // sigma of the blob as an angle; > 0, < 1
   double focal_length_px = 0;  // with which its size was measured
   Descriptor descriptor{};
   LandmarkLife life;
-  // By increasing keyframe id, one for each keyframe. Landmarks born after the map was built have
-  // none.
+  // By increasing keyframe id, at most one for each keyframe. Landmarks born after the map was
+  // built have none.
   std::vector<SceneSighting> sightings;
 
   [[nodiscard]] Matrix2<double> whole_covariance() const { return covariance + shared_covariance; }
 };
 
 struct SceneMap {
-  // Upper limits of a valid map. With pictures a map of this size exceeds a board's memory, see
+  // Upper limits of a valid map. A map of this size with pictures exceeds a board's memory, see
   // scene_map_file.h.
   static constexpr std::size_t kMostKeyframes = 100'000;
   static constexpr std::size_t kMostLandmarks = 1'000'000;

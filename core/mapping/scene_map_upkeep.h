@@ -4,8 +4,8 @@
 // landmarks that were seen (landmark_filter.h, descriptors by a running average), born or dead.
 // Bounded: the sphere is divided into cells, in proportion to the landmarks' size, and each cell
 // holds a limited number of landmarks. In a full cell or map a new landmark replaces the least
-// useful landmark if the new one is worth more. The number of candidates, which are kept beside the
-// map, is bounded too; losing the candidates at the end does no harm.
+// useful landmark if the new one is worth more. Candidates for new landmarks are kept here, not in
+// the map. Their number is bounded too; losing them at the end does no harm.
 // Equal pictures give equal changes. Allocates; one thread at a time. Rules: docs/derivations.md.
 
 #include <cstdint>
@@ -80,7 +80,7 @@ struct UpkeepView {
 struct UpkeepCounts {
   int expected = 0;     // landmarks that should be found in this picture
   int updated = 0;      // matched landmarks that were moved
-  int beyond_gate = 0;  // matched landmarks that were not moved: too far off, or not seen there
+  int beyond_gate = 0;  // matched landmarks that were not moved: too far away, or not seen there
   int born = 0;
   int died = 0;
   int not_close = 0;        // not born only because of the proximity check
@@ -90,7 +90,7 @@ struct UpkeepCounts {
 
 class SceneMapUpkeep {
  public:
-  // With options that validate() refuses, show() refuses everything.
+  // If validate() refuses the options, show() refuses everything.
   explicit SceneMapUpkeep(const SceneMapUpkeepOptions& options = {})
       : options_(options), valid_(options.validate()) {}
 

@@ -84,7 +84,7 @@ class ArrivalPace {
     return greatest_s_ > least_s + longer_s;
   }
 
-  // The latest items, 128 at most, oldest first; s.
+  // The latest items, 128 at most, oldest first; s. i: below size().
   [[nodiscard]] std::size_t size() const { return size_; }
   [[nodiscard]] double receive_s(std::size_t i) const { return item(i).receive_s; }
   [[nodiscard]] double sender_s(std::size_t i) const { return item(i).sender_s; }

@@ -90,7 +90,8 @@ struct Calibration {
   Mechanics<double> mechanics;
   double clock_offset = 0;     // s: telemetry clock = image clock + clock_offset
   std::optional<double> zoom;  // device units at which this calibration holds
-  // By Parameter, in their units. A zero row marks a parameter that is taken as exact.
+  // Rows and columns: Parameter, in the parameters' units. A zero row marks a parameter that is
+  // taken as exact.
   ParameterCovariance<double> covariance = ParameterCovariance<double>::Zero();
 
   // False only if the optical centre is exactly the image's middle: offset and variance are 0.

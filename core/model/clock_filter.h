@@ -24,6 +24,7 @@ namespace alidade {
 template <std::size_t Capacity = 256>
 class ClockFilter {
  public:
+  // options: validate() must accept them. A filter takes update() or update_sequence(), not both.
   explicit ClockFilter(const ClockFilterOptions& options = {})
       : options_(options), one_sided_(options), symmetric_(options) {}
 
@@ -38,7 +39,7 @@ class ClockFilter {
   }
 
   // Host time (s) of any sender time (s) or count, by the present line. 0 while there is no line:
-  // before the first item, and from restart() until the next one.
+  // before the first finite item, and from restart() until the next one.
   double to_host(double sender) const {
     return started_ ? anchor_receive_ + line().value_at(sender - anchor_sender_) : 0.0;
   }
@@ -50,7 +51,7 @@ class ClockFilter {
   }
 
   // Slope of the line. skew: host seconds per sender second, minus 1. period_s: host seconds per
-  // count of a counted stream.
+  // count of a counted stream. Both mean nothing while there is no line.
   double skew() const { return line().slope - 1; }
   double period_s() const { return line().slope; }
 
@@ -99,7 +100,7 @@ class ClockFilter {
   //   step of the minimum delay, one-sided only
   //               See one_sided_clock.h. Flagged once; the line does not step.
   // Lost items are gaps in sender. Repeated and reordered items are answered, but do not move the
-  // line; of kOneSided they count for jitter and steps.
+  // line. For kOneSided they still count for jitter and steps.
   ClockEstimate accept(double receive, double sender, const ClockRatePrior& prior) {
     return is_one_sided() ? accept(&one_sided_, receive, sender, prior)
                           : accept(&symmetric_, receive, sender, prior);

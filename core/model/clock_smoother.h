@@ -111,7 +111,8 @@ class ClockSmoother {
       } else if (step > 0 || receive_[j] < since - options_.settle_s / 10) {
         break;
       }
-      // The last items before a fall may have either minimum delay. Raising them does no harm.
+      // The last items before a fall may have the old or the new minimum delay. Raising them does
+      // no harm.
       y_[j] -= step;
     }
     estimates_[first].delay_stepped = true;
@@ -297,7 +298,8 @@ class ClockSmoother {
 
 }  // namespace internal
 
-// Writes estimates[0 .. n-1], one for each item in order of arrival. scratch: room for n values.
+// Writes estimates[0 .. n-1], one for each item in order of arrival. options: validate() must
+// accept them. scratch: room for n values.
 inline void smooth_clock(const ClockFilterOptions& options, const double* receive_time_s,
                          const double* sender_time_s, std::size_t n, ClockEstimate* estimates,
                          double* scratch) {

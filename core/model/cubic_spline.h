@@ -30,9 +30,10 @@ class CubicSpline {
   using Basis = SplineBasis;
   using Point = Matrix<double, N, 1>;
 
+  // Without segments: only segments(), copying and assignment are allowed.
   CubicSpline() = default;
 
-  // One segment between neighbouring knots; all control points 0. Needs two or more knots,
+  // One segment between neighbouring knots; all control points 0. Needs two or more knots, strictly
   // increasing.
   explicit CubicSpline(const std::vector<double>& knots_s) {
     const double first_length = knots_s[1] - knots_s[0];
@@ -98,7 +99,8 @@ class CubicSpline {
     return control_points_[static_cast<std::size_t>(i)];
   }
 
-  // The same curve with one more knot in the middle of each given segment. Indices must increase.
+  // The same curve with one more knot in the middle of each given segment. Indices: strictly
+  // increasing, from 0 to segments() - 1.
   [[nodiscard]] Derived split(const std::vector<int>& segments_to_split) const {
     Derived result = static_cast<const Derived&>(*this);
     result.insert_knots(segments_to_split);

@@ -2,11 +2,12 @@
 // DelayWander: detects whether a stream's items leave the line of its clock repeatedly, and how
 // far.
 //   lateness_i = receive_i - line(sender_i); its minimum over a window is about 0 on the line
-// Usually the minimum delay is constant, or it steps (MinimumDelayStep). If it rises and falls for
-// ever, either the delay wanders, as behind a relay whose buffer fills and empties; or the stamps
-// wander, and arrivals tell the time better than the line. Stamps alone cannot tell which, so the
-// distance from the line is an uncertainty of an item's time (docs/clocks.md).
-// Fixed memory, trivially copyable, no allocation, no exceptions; one thread. Host clock, seconds.
+// Usually the minimum delay is constant, or it steps (MinimumDelayStep). If it rises and falls
+// again and again, there are two causes. The delay wanders, as behind a relay whose buffer fills
+// and empties; or the stamps wander, and arrivals tell the time better than the line. Stamps alone
+// cannot tell which. So the distance from the line is an uncertainty of an item's time
+// (docs/clocks.md). Fixed memory, trivially copyable, no allocation, no exceptions; one thread.
+// Host clock, seconds.
 
 #include <algorithm>
 #include <array>
@@ -28,7 +29,7 @@ class DelayWander {
   // For a new line. The present uncertainty stays and fades.
   void restart() { windows_ = {{{kPart_s, {}, {}}, {kLongPart_s, {}, {}}}}; }
 
-  // receive_s: in order. gate_s: the line's own uncertainty, >= 0.
+  // Values must be finite. receive_s: in order. gate_s: the line's own uncertainty, >= 0.
   void add(double receive_s, double lateness_s, double gate_s) {
     const double since_s = std::max(0.0, receive_s - last_s_);
     last_s_ = receive_s;
@@ -90,7 +91,7 @@ class DelayWander {
     // sets them to e^-10.
     // - Two items come before the line by more than the gate, as nothing is early.
     // The distance is the larger minimum of the parts, plus their difference: the latest item is
-    // farther off than either.
+    // farther off than both minima.
     [[nodiscard]] double off_s(double gate_s) const {
       if (old.items == 0) return 0;
       const double items = old.items + young.items;

@@ -1,8 +1,8 @@
 #pragma once
 // infer_sequence(): gives counts to a recording that has none, by finding how many periods lie
 // between neighbouring items. Losses are gaps; a duplicate repeats its count.
-// Works for noise up to a sixth of a period (sigma). The given period may be off by 1 %, as the
-// period is tracked. Allocates nothing.
+// Works for noise up to a sixth of a period (sigma). The period is tracked, so the given one may
+// differ from it by 1 %. Allocates nothing.
 
 #include <algorithm>
 #include <array>
@@ -59,7 +59,7 @@ inline double periods_skipped(const std::array<double, kItemsAhead>& late, std::
 
 // receive_time_s and sequence: n values; receive times in order of arrival. period_s: > 0. The
 // first count is 0. False if period_s is not positive, if a number is not finite, or if more than
-// kMostSkipped counts lie between two items; `sequence` is then not to be used.
+// 1e12 counts lie between two items; `sequence` is then not to be used.
 [[nodiscard]] inline bool infer_sequence(const double* receive_time_s, std::size_t n,
                                          double period_s, std::int64_t* sequence) {
   constexpr double kTracking = 1.0 / 16;

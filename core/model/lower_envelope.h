@@ -53,8 +53,9 @@ class LowerEnvelope {
   void release() { held_from_ = kNever; }
 
   [[nodiscard]] const LineEstimate& line() const { return line_; }
-  // s; of the items' delays, by those near the least one: their density there is 1 / scale. That is
-  // the mean of exponential delays, and more where few are that short, as behind a relay.
+  // s; the scale of the items' delays: their density next to the least delay is 1 / scale. The
+  // scale of exponential delays is their mean. Where few delays are short, as behind a relay, the
+  // scale is larger than the mean.
   [[nodiscard]] double delay_scale_s() const {
     return slots_ > 0 ? scale_ * std::max(1.0, items_ / static_cast<double>(slots_)) : scale_;
   }

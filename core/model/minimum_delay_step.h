@@ -3,8 +3,9 @@
 // residuals (receive time minus line). Two runs of items are kept: late ones, and all from the
 // first early one on.
 //   rise  no item comes down to the line for settle_s
-//   fall  some items come before the line
-// Either is a step only if the minimum residuals of two neighbouring halves of settle_s agree.
+//   fall  two or more items come before the line
+// A rise or a fall is a step only if the minimum residuals of two neighbouring halves of settle_s
+// agree.
 // Fixed memory, trivially copyable, no allocation, no exceptions. All times are host seconds.
 // Statistics: docs/clocks.md.
 
@@ -76,8 +77,8 @@ class MinimumDelayStep {
   static constexpr std::size_t kLowest = 8;   // residuals that a half's spread is taken from
 
   // A suspected rise, long before it is judged. n exponential delays of mean s all exceed m with
-  // probability e^(-n m / s). Of the late items up to the last, keeps the run with the greatest n m
-  // / s.
+  // probability e^(-n m / s). Among the runs of late items that end with the last one, it keeps the
+  // run with the greatest n m / s.
   struct Stretch {
     double items = 0;
     double first = 0;  // receive times
@@ -106,7 +107,7 @@ class MinimumDelayStep {
     double since = 0;   // of the older half's first item
     double middle = 0;  // of the younger half's first item
     double older = 0;   // minimum residual
-    // Of the younger half:
+    // The younger half:
     double items = 0;
     double early = 0;
     double sum = 0;

@@ -150,7 +150,7 @@ class OneSidedClock {
   MinimumDelayStep steps_;
   double anchor_receive_s_ = 0;
   double delay_s_ = 0;
-  // As of the last item that came down to the line:
+  // Values at the last item that came down to the line:
   double usual_delay_s_ = 0;    // delay_s_, or more if few delays come near the least one
   double sigma_on_line_s_ = 0;  // of the line
   bool locked_ = false;

@@ -126,7 +126,7 @@ class DrivingAngle {
   bool begun_ = false;
 };
 
-// The true angle, computed from readings, for either kind. next() takes each reading once, in
+// The true angle, computed from readings, for each kind of play. next() takes each reading once, in
 // order, after scale and error curve were removed.
 class PlayOfReadings {
  public:

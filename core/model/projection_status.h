@@ -1,5 +1,5 @@
 #pragma once
-// Result of a projection or back-projection: ok, or why there is none. Outputs are written with kOk
+// Result of a projection or back-projection: ok, or why there is none. Outputs are valid with kOk
 // only.
 
 namespace alidade {
@@ -7,7 +7,7 @@ namespace alidade {
 enum class ProjectionStatus {
   kOk,
   kBehindCamera,           // the direction has no positive component along the optical axis
-  kBeyondDistortionLimit,  // radial_distortion < 0, beyond the radius where the model turns back
+  kBeyondDistortionLimit,  // radial_distortion < 0, at or beyond where the model turns back
   kNoRow,                  // rolling shutter: no unique row, as the motion overtakes the read-out
   kNotFinite               // an argument is not finite, or the result is too large to represent
 };

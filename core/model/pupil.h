@@ -1,9 +1,10 @@
 #pragma once
 // The entrance pupil: where rays seem to enter the lens. Directions are seen from there, and the
-// base's origin is where pan and tilt axis meet. With the pupil at o a thing at the distance r,
-// both from the origin, is seen in the direction d_seen, and lies in the direction d:
+// base's origin is where pan and tilt axis meet. o is the pupil's place from the origin, in camera
+// axes (right, down, forward; m). A thing at the distance r from the origin lies in the direction d
+// and is seen in the direction d_seen:
 //   r d = R_base_from_camera o + t d_seen,   t > 0
-// Camera axes: right, down, forward; m. Far things need none of this. Pure; no allocation.
+// The two directions of a far thing are the same. Pure; no allocation.
 
 #include <cmath>
 #include <limits>
@@ -15,7 +16,7 @@ namespace alidade {
 
 // Usual lenses on usual heads: one standard deviation along each axis.
 inline constexpr double kUsualPupilSigma_m = 0.05;
-// Of a place that somebody measured.
+// The same for a place that somebody measured.
 inline constexpr double kStatedPupilSigma_m = 0.005;
 
 struct Pupil {
@@ -28,7 +29,7 @@ struct Pupil {
 inline constexpr double kFarthestPupil_m = 1;
 inline constexpr double kNearestScene_m = 1;
 
-// Of what is in view, from where pan and tilt axis meet. farthest_m >= nearest_m > 0.
+// Distances of what is in view, from where pan and tilt axis meet. farthest_m >= nearest_m > 0.
 struct SceneDistance {
   double nearest_m = kNearestScene_m;
   double farthest_m = std::numeric_limits<double>::infinity();
@@ -41,8 +42,8 @@ struct Nearness {
   double sigma = 0;
 };
 
-// Of what is in view on average. The mean of its inverse distances may be anywhere between those of
-// the scene's ends.
+// Nearness of what is in view, on average. The mean of its inverse distances may be anywhere
+// between those of the scene's ends.
 [[nodiscard]] inline Nearness scene_nearness(const Pupil& pupil, const SceneDistance& scene) {
   const double near = 1 / scene.nearest_m;
   const double far = 1 / scene.farthest_m;
@@ -84,9 +85,9 @@ struct Nearness {
   return true;
 }
 
-// m; nearer things look as through a focal length that differs from that of far things by a share
-// of more than relative_sigma, for a pupil one standard deviation farther off than its place. 0,
-// that is no limit, if relative_sigma is not positive.
+// The distance (m) from which a focal length of far things holds. Nearer things look as through a
+// focal length that differs by a share of more than relative_sigma, if the pupil is one standard
+// deviation farther from the axes than its place. 0 (no limit) if relative_sigma is not positive.
 [[nodiscard]] inline double holds_beyond_m(const Pupil& pupil, double relative_sigma) {
   const double forward = std::abs(pupil.place_m.z()) + pupil.sigma_m.z();
   return relative_sigma > 0 ? forward / relative_sigma : 0;

@@ -27,8 +27,8 @@ inline constexpr double kMaxClockOffsetError_s = 0.01;
 inline constexpr double kMaxReadoutError_s = 5e-3;   // from the first to the last row
 inline constexpr double kMaxDistortionError = 0.02;  // of the radius, in the corner
 
-// Of parts of a recording that contradict each other, in units of what noise explains, where no
-// cause shows.
+// Largest scatter between parts of a recording that contradict each other, in units of what noise
+// explains, if no cause shows.
 inline constexpr double kMaxScatter = 30;
 
 // Recordings to calibrate several zooms from.
@@ -37,7 +37,7 @@ inline constexpr int kZoomsAsked = 5;
 
 // Recordings to build a scene map from.
 inline constexpr double kSlowMotion_px = 10;  // "slowly": of the image, during the read-out
-// With a calibration the motion of each row is known, and only blur limits the speed.
+// The same with a calibration: the motion of each row is known, and only blur limits the speed.
 inline constexpr double kSlowMotionCalibrated_px = 50;
 inline constexpr double kMapOverlapAsked = 0.33;  // of two neighbouring views
 
@@ -46,7 +46,7 @@ inline constexpr double kVerificationLeast_s = 30;
 inline constexpr double kVerificationAsked_s = 60;
 inline constexpr double kVerificationRangeLeast = 0.5;  // fields of view, for each axis
 inline constexpr double kVerificationRangeAsked = 1;    // likewise
-inline constexpr int kReversalsLeast = 4;               // of either axis
+inline constexpr int kReversalsLeast = 4;               // of pan and tilt together
 inline constexpr double kReturnGapLeast_s = 1;          // until a place counts as seen again
 inline constexpr double kReturnOverlapLeast = 0.3;      // of two pictures that are compared
 inline constexpr int kReturnsLeast = 20;                // pairs of pictures

@@ -1,7 +1,7 @@
 #pragma once
 // SO(3): rotation matrices R and their tangent vectors w (rad).
 //   Exp(w) = I + sin(t)/t [w] + (1 - cos(t))/t^2 [w]^2,  t = |w|          (PTCEE 4, Rodrigues)
-//   Log(Exp(w)) = w for |w| < pi; at |w| = pi either of the two logarithms
+//   Log(Exp(w)) = w for |w| < pi; at |w| = pi one of the two logarithms
 //   Exp(w + e) = Exp(J_l(w) e) Exp(w) = Exp(w) Exp(J_r(w) e)              to first order in e
 // Everywhere in Alidade a rotation is perturbed on the right, R Exp(xi) (PTCEE 5): the xi of an
 // R_base_from_camera is in the camera frame.

@@ -2,7 +2,7 @@
 // StampCount: detects stamps that count items instead of telling time.
 //   sender_i = constant + step (i + lost in the network),  whatever time passes between two items
 // If such a sender leaves items out or takes them at another rate, its stamps do not show this:
-// receive - sender rises and never falls again. With a growing backlog receive - sender rises too,
+// receive - sender rises and never falls again. A growing backlog makes receive - sender rise, too,
 // but not for ever (docs/clocks.md).
 // Fixed memory, trivially copyable, no allocation, no exceptions; one thread. All times are
 // seconds.

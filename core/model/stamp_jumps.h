@@ -3,7 +3,7 @@
 //   jump_i = (sender_i - sender_(i-1)) - (receive_i - receive_(i-1))
 // A varying delay moves the arrival. An item that is left out moves arrival and stamp, except at
 // the end of a backlog. If the arrival came at the usual interval and the stamp did not, the stamp
-// jumped, and the line through the stamps is off by the jump at once. Slow wander is DelayWander's
+// jumped, and the line through the stamps errs by the jump at once. Slow wander is DelayWander's
 // task.
 // Fixed memory, trivially copyable, no allocation, no exceptions; one thread. All times are
 // seconds.
@@ -49,7 +49,7 @@ class StampJumps {
     spread_s_ += (std::min(arrival_off_s, usual_s_) - spread_s_) / std::min(items_, kManyItems);
   }
 
-  // s; how far stamps may be off now.
+  // s; how wrong stamps may be now.
   [[nodiscard]] double off_s() const { return seen_s_; }
 
  private:

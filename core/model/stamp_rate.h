@@ -55,7 +55,7 @@ class StampRate {
   //                known by then) lie on one line, to kEven_s or 3 standard deviations of a minimum
   //                of exponential delays;
   //   long enough  to exclude a backlog: the drift has reached kApart_s, or kFarApart_s if |b|
-  //                exceeds kNear, which no clock is off by.
+  //                exceeds kNear, an error that no clock has.
   [[nodiscard]] std::optional<double> off() const {
     if (!even_since_s_ || std::abs(slope_) < kQuartz) return std::nullopt;
     const double apart_s = std::abs(slope_) * (last_receive_s_ - *even_since_s_);

@@ -42,8 +42,8 @@ class SteadyZoom {
     return rests_ ? at_rest(zoom) : moving(zoom);
   }
 
-  // sigma: of the jitter, as known from earlier readings; device units. The next reading begins a
-  // rest.
+  // sigma: of the jitter, as known from earlier readings; device units, > 0. The next reading
+  // begins a rest.
   void know(double sigma) {
     sigma_ = own_sigma_ = creep_ = sigma;
     rests_ = true;

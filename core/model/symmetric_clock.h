@@ -3,8 +3,8 @@
 // State (value, rate) at x. Between items the skew walks with density q = skew_wander^2 rate^3 per
 // count or second of x. Over dx this adds
 //   Q = q [dx^3/3  dx^2/2; dx^2/2  dx].
-// Weighted least squares joins the first items, a Kalman filter the later ones. Errors beyond 2.5
-// sigmas are down-weighted (Huber). The noise level is the mean logarithm of the errors.
+// Weighted least squares uses the first items, a Kalman filter the later ones. Errors beyond 2.5
+// sigmas are down-weighted (Huber). The noise level comes from the mean logarithm of the errors.
 // Derivation: docs/clocks.md. Same interface as OneSidedClock; there is no minimum delay that could
 // step. Fixed memory, trivially copyable, no allocation, no exceptions.
 

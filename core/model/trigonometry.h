@@ -5,7 +5,7 @@
 //   cubic_quotient     (theta - sin(theta)) / theta^3
 //   inverse_quotient   1 / theta^2 - cot(theta / 2) / (2 theta)
 // They are smooth at 0, although their formulas are not. Below theta^2 = 0.01 a series is used,
-// with a truncation error under 3e-15 of the value. With theta^2 as argument, not theta, the
+// with a truncation error under 3e-15 of the value. The argument is theta^2, not theta, so that the
 // derivative of a differentiation type stays finite at 0. inverse_quotient is singular at theta = 2
 // pi.
 

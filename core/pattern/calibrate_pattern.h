@@ -1,7 +1,7 @@
 #pragma once
 // calibrate_pattern(): line delay and lens, with covariance, from a video of a known pattern taken
 // by a moving camera (Oth et al., 2013). Intrinsics and distortion are estimated together with the
-// line delay; the paper leaves this open. Start: lens and poses as if all rows were exposed at
+// line delay, which goes beyond the paper. Start: lens and poses as if all rows were exposed at
 // once. Repeatedly: adjust curve and lens, reject wrong detections, estimate the noise of the
 // others, split the curve where residuals ask for it. Last: least squares on the inliers. A pattern
 // larger or smaller than named is not noticed: lens and line delay stay the same, positions and
@@ -40,6 +40,7 @@ struct PatternCalibrationOptions {
   double largest_focal_length_sigma = 0.008;
 };
 
+// If status is not kOk, the members other than status and message may be incomplete.
 struct PatternCalibration {
   PatternStatus status = PatternStatus::kBadInput;
   std::string message;               // if refused: one line, what is wrong and what would help

@@ -38,7 +38,7 @@ class CharucoLayout {
   [[nodiscard]] bool is_black(int column, int row) const;  // of squares
   // Images so far in which at least three markers of the dictionary were found.
   [[nodiscard]] int images_with_markers() const { return images_with_markers_; }
-  // Markers agree, but equally well in both layouts.
+  // Markers agree, but about equally well in both layouts.
   [[nodiscard]] bool is_undecided() const;
   // Another dictionary of which many markers were found, while no marker of the board's dictionary
   // was. Empty: none.

@@ -14,15 +14,15 @@
 namespace alidade::internal {
 
 struct CircleCentres {
-  // By centre. 0: its area differs from the others', or could not be measured. All 1 if radius_m is
-  // 0.
+  // One for each centre. 0: its area differs from the others', or could not be measured. All 1 if
+  // radius_m is 0.
   std::vector<char> is_whole;
   std::vector<Vector2<double>> beside;  // by centre; shift that was taken off, px
   double radius_m = 0;                  // of all circles; 0: not measured, nothing was taken off
 };
 
 // image: 8-bit grey. centres: OpenCV's pixels, one for each of pattern.points_m(), in its order; in
-// to about a pixel, out refined.
+// to about a pixel, out refined. If radius_m is 0, they are centroids or as they were.
 [[nodiscard]] CircleCentres refine_circles(const cv::Mat& image, const KnownPattern& pattern,
                                            std::vector<cv::Point2f>* centres);
 

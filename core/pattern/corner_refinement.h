@@ -12,7 +12,7 @@ namespace alidade::internal {
 // Half the side of a window around one corner that holds no other, px; 2 to 11.
 [[nodiscard]] int corner_window(const std::vector<cv::Point2f>& corners);
 
-// Refines each corner in such a window. image: 8-bit grey.
+// Refines each corner in such a window. image: 8-bit grey. The corners must lie in the image.
 void refine_corners(const cv::Mat& image, std::vector<cv::Point2f>* corners);
 
 }  // namespace alidade::internal

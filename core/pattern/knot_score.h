@@ -14,11 +14,12 @@
 namespace alidade::internal {
 
 struct KnotScoreOptions {
-  double sigma_px = 1;  // of an observation's coordinate
+  double sigma_px = 1;  // of an observation's coordinate, > 0
   // Least length of a half, in frames that show the pattern there.
   double shortest_frames = 0.5;
 };
 
+// A segment with fewer than 12 observations counts nowhere.
 struct KnotScore {
   std::vector<int> split;    // segments to halve, in increasing order
   double gain = 0;           // fall of the sum of squares (sigma^2) if all long enough were halved

@@ -51,11 +51,13 @@ struct KnownPattern {
   // Number of a ChArUco board's markers: one in every second square.
   [[nodiscard]] int markers() const { return columns * rows / 2; }
 
-  // Whether it looks the same after half a turn.
+  // Whether it looks the same after half a turn, at least to the detector.
   [[nodiscard]] bool is_symmetric() const;
 };
 
 // Empty and one line in *error (what is wrong, what would be right) if the text names no pattern.
+// Limits: counts 3 to 100 (tags 1 to 100, 587 in all), lengths 0.1 mm to 10 m, gap above 0 to 2, a
+// marker smaller than its square, a dictionary with enough markers.
 [[nodiscard]] std::optional<KnownPattern> parse_pattern(const std::string& text,
                                                         std::string* error);
 

@@ -19,7 +19,7 @@ namespace alidade {
 struct LensCamera {
   Camera<double> camera;
   double line_delay = 0;  // s/row
-  // Of f (px), alpha, k and line delay (s/row).
+  // Covariance of f (px), alpha, k and line delay (s/row).
   Matrix<double, 4, 4> covariance = Matrix<double, 4, 4>::Zero();
   double misfit_px = 0;  // rms that no rotation and no k absorbs
 };

@@ -7,7 +7,7 @@ namespace alidade::internal {
 class NowAndThen {
  public:
   // find: looks for something and returns whether it is there. After four images in vain it is
-  // called in every eighth one only, and the result is false without looking.
+  // called in every eighth one only; in the others the result is false.
   template <class Find>
   bool operator()(const Find& find) {
     constexpr int kPatience = 4;

@@ -1,7 +1,7 @@
 #pragma once
 // Joint adjustment of pose curve and lens (Oth 7, with theta the whole lens) to all observations,
 // with a weak prior on the curve's accelerations (Oth, section 4.1) and the prior knowledge of the
-// lens. By Ceres, with analytic Jacobians.
+// lens. Uses Ceres, with analytic Jacobians.
 
 #include <optional>
 #include <vector>
@@ -41,7 +41,8 @@ enum class AdjustmentEnd {
   kFailed,      // no usable solution
 };
 
-// *state: in, the start; out, the solution; after kFailed not to be used.
+// *state: in, the start, at which all used observations have a projection; out, the solution; after
+// kFailed not to be used.
 [[nodiscard]] AdjustmentEnd adjust_pattern(const PatternData& data, const PatternMask& used,
                                            const LensKnowledge& knowledge,
                                            const PatternAdjustmentOptions& options,
@@ -59,7 +60,8 @@ struct LensCovariance {
   }
 };
 
-// At the state, with the curve free. Empty if a parameter that is not fixed is undetermined.
+// At the state, with the curve free. Empty if a parameter that is not fixed is undetermined, or if
+// a used observation has no projection.
 [[nodiscard]] std::optional<LensCovariance> lens_covariance(const PatternData& data,
                                                             const PatternMask& used,
                                                             const LensKnowledge& knowledge,

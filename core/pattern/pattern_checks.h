@@ -40,7 +40,7 @@ inline constexpr const char* kMoveFaster =
 [[nodiscard]] std::string how_to_move(const PatternViews& views);
 [[nodiscard]] std::string how_to_show(const PatternViews& views);
 
-// std::snprintf into a string.
+// std::snprintf into a string of at most 319 characters. format: takes doubles, at most two.
 [[nodiscard]] std::string formatted(const char* format, double a, double b = 0);
 
 }  // namespace alidade::internal

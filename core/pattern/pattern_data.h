@@ -10,8 +10,8 @@ namespace alidade {
 struct PatternObservation {
   int point = 0;      // index into PatternData::points_m
   Vector2<double> u;  // px, the centre of the top-left pixel is at (0.5, 0.5)
-  // For a circle: u is the centroid of its image minus `beside` (px), and radius_m is its radius as
-  // measured. radius_m 0: not a circle.
+  // For a circle: u is the centroid of its image minus `beside` (px), the shift by perspective and
+  // lens; radius_m is its radius as measured. radius_m 0: not a circle.
   Vector2<double> beside = Vector2<double>::Zero();
   double radius_m = 0;
 };

@@ -23,8 +23,8 @@ class PatternDetector {
   PatternDetector(const PatternDetector&) = delete;
   PatternDetector& operator=(const PatternDetector&) = delete;
 
-  // 8-bit luma, row v at luma + v * stride, stride >= width. The observations are ordered by point;
-  // empty if the pattern is not found, or a side is shorter than kLeastImage_px.
+  // 8-bit luma, not null, row v at luma + v * stride, stride >= width. The observations are ordered
+  // by point; empty if the pattern is not found, or a side is shorter than kLeastImage_px.
   [[nodiscard]] std::vector<PatternObservation> find(const std::uint8_t* luma, int width,
                                                      int height, std::ptrdiff_t stride);
 
@@ -37,9 +37,9 @@ class PatternDetector {
   std::unique_ptr<State> state_;
 };
 
-// A pattern that looks the same after half a turn may be numbered either way in each frame. Numbers
-// each frame like the one before it, so that the camera's motion is continuous. Frames more than
-// max_gap_s apart are not compared.
+// A pattern that looks the same after half a turn may be numbered from the other end in some
+// frames. Numbers each frame like the one before it, so that the camera's motion is continuous.
+// Frames more than max_gap_s apart are not compared. Other patterns stay as they are.
 void follow_half_turns(const KnownPattern& pattern, double max_gap_s, PatternData* data);
 
 }  // namespace alidade

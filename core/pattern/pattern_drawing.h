@@ -1,7 +1,8 @@
 #pragma once
-// A known pattern as an SVG page in true size, for printing at 100 %. Below or beside it a caption
-// says what it is, and a ruler shows whether the printer kept the size. They are left out where the
-// paper has no room for them. Pure text.
+// A known pattern as an SVG page in true size, for printing at 100 %. A caption below or at its
+// side says what it is, and a ruler shows whether the printer kept the size. They are left out
+// where the paper has no room for them; so are an AprilGrid's outer black squares. Pure text.
+// pattern: as parse_pattern() accepts it.
 
 #include <optional>
 #include <string>

@@ -27,8 +27,8 @@ using CornerSquares = std::array<bool, 4>;
 // Corners of a tag with this many cells a side: lower left, lower right, upper right, upper left.
 [[nodiscard]] std::vector<cv::Point2f> tag_square(int side);
 
-// image: 8-bit grey, here and below. corners: four, OpenCV's pixels, in that order; about a pixel
-// off at first. gap: to the next tag, equal to the side of a square outside; as a share of the
+// image: 8-bit grey, here and below. corners: four, OpenCV's pixels, in that order; good to about a
+// pixel at first. gap: to the next tag, equal to the side of a square outside; as a share of the
 // tag's side. False if the corners leave the image or it does not show the tag there; *corners are
 // then not to be used.
 [[nodiscard]] bool refine_tag_corners(const cv::Mat& image, const TagFace& face,

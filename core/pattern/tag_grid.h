@@ -57,7 +57,7 @@ class TagGrid {
   [[nodiscard]] bool confirm(const cv::Mat& image, int tag, Corners* corners);
   [[nodiscard]] double code_correlation(const cv::Mat& image, int tag,
                                         const Corners& corners) const;
-  // Which of the tag's corners have squares printed beside them. The image decides what is not
+  // Which of the tag's corners have squares printed next to them. The image decides what is not
   // known yet.
   [[nodiscard]] CornerSquares squares_of(int tag, const Corners& corners);
 

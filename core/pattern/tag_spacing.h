@@ -26,7 +26,7 @@ class TagSpacing {
   // are enough others.
   void add(const std::vector<NumberedTag>& tags, bool rough);
 
-  // Gap between tags, as a share of their side. As named, unless it was measured to be different.
+  // Gap between tags, as a share of their side: the named one, unless it was measured to differ.
   [[nodiscard]] double gap() const { return gap_; }
 
   // One line about what differs from the name; empty if nothing is known to differ.

@@ -3,10 +3,10 @@
 // it: R_base_from_camera at row 0 (PTCEE 45), angular velocity (PTCEE 46), and for any row v
 //   direction = R_base_from_camera(angle + rate t + acceleration t^2 / 2) unproject(u),
 //   t = v * line_delay   (PTCEE 26, 27, and beyond)
-// Angles are TRUE (rad): the measured ones divided by the calibrated scales. Frames: base b (FRD),
-// camera c (RDF). An orientation is perturbed as R Exp(xi), xi in the camera frame (PTCEE 5). xi is
-// the error of directions in the image's middle: an error of the optical centre by c px counts as a
-// turn by c / f, with its correlation to the errors of the axes.
+// Angles are TRUE (rad): measured ones without known errors, divided by the scales. Frames: base b
+// (FRD), camera c (RDF). An orientation is perturbed as R Exp(xi) (PTCEE 5), xi in the camera
+// frame. xi is the error of directions in the image's middle: an error of the optical centre by
+// c px counts as a turn by c / f, with its correlation to the errors of the axes.
 // Pixels are continuous; the centre of the top-left one is (0.5, 0.5). Covariances are first-order
 // and contain the calibration's. No allocation; plain values; any number of threads may read one.
 
@@ -70,7 +70,8 @@ struct FrameOrientation {
   }
 
   // Direction of pixel u in b at the time of its own row. cov, if not null, is its covariance
-  // (rad^2) in tangent_basis(*d_b) for an exact u. kNotFinite with mode kNone, here and below.
+  // (rad^2) in tangent_basis(*d_b) for an exact u. Outputs are written with kOk only. kNotFinite
+  // with mode kNone. Both hold for pixel(), too.
   [[nodiscard]] ProjectionStatus direction(const Vector2<double>& u, Vector3<double>* d_b,
                                            Matrix2<double>* cov = nullptr) const;
 

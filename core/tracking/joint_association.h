@@ -35,13 +35,14 @@ class JointAssociation {
 
   JointAssociation(int max_targets, int max_detections);
 
-  // pairs: ordered by target, each pair once, indices below the capacities. missed[t] in (0, 1]: m
-  // of target t. Fills in the weights. 1 minus the sum of a target's weights is the probability
-  // that it has none of the detections.
+  // targets: at most max_targets. pairs: ordered by target, each pair once, indices below `targets`
+  // and max_detections, ratios >= 0. missed[t] in (0, 1]: m of target t. Fills in the weights. 1
+  // minus the sum of a target's weights is the probability that it has none of the detections.
   void weigh(AssociationMethod method, const double* missed, int targets, GatedPair* pairs,
              int count);
 
-  // Clusters of the last call with kExact: those weighed exactly, and those too large for it.
+  // Clusters of the last call: those weighed exactly, and those too large for it. Both are 0 unless
+  // it was with kExact.
   [[nodiscard]] int exact_clusters() const { return exact_clusters_; }
   [[nodiscard]] int cheap_clusters() const { return cheap_clusters_; }
 

@@ -6,8 +6,8 @@
 //   update   W = P J^T S^-1, S = J P J^T + V                       (16, 17); V: detection's
 // H_measured_from_world is a homography from the plane, or from directions in base, to measured
 // coordinates: pixels, or metres if H is the identity. In the chart no angle wraps, and poles are
-// ordinary places. With several weighted detections the result is the mixture's mean and
-// covariance. Fixed size; no allocation, no shared state. Details: docs/derivations.md.
+// ordinary places. Several weighted detections give the mixture's mean and covariance. Fixed size;
+// no allocation, no shared state. Details: docs/derivations.md.
 
 #include <optional>
 
@@ -76,8 +76,8 @@ struct AzimuthElevation {
   Vector4<double> value = Vector4<double>::Zero();
   Matrix4<double> cov = Matrix4<double>::Identity();  // of value
 };
-// Of a state on the sphere. Azimuth grows to the right and elevation upwards; base is
-// forward-right-down. Empty within a microradian of a pole, where azimuth is undefined.
+// Azimuth and elevation of a state on the sphere. Azimuth grows to the right and elevation upwards;
+// base is forward-right-down. Empty within a microradian of a pole, where azimuth is undefined.
 [[nodiscard]] std::optional<AzimuthElevation> azimuth_elevation(const TargetState& state);
 
 }  // namespace alidade

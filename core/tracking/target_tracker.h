@@ -2,7 +2,8 @@
 // TargetTracker: targets from detections, frame by frame: predicted, associated, updated
 // (target_filter.h, joint_association.h), born and given up. Rules: docs/derivations.md. A late
 // frame is put in its place and the frames after it are processed again: the result is that of the
-// right order, and identities stay. A frame with any fault is refused as a whole, with its reason.
+// right order. A target that is then born again keeps its identity if it is near where it was. A
+// frame with any fault is refused as a whole, with its reason.
 // Identities count from 1 and are never reused. Equal calls give equal results. For one thread. The
 // constructor takes all memory, no call allocates: about max_targets * (300 + 100 max_detections) +
 // history_frames * (320 max_targets + 50 max_detections) bytes.
@@ -80,11 +81,11 @@ class TargetTracker {
   // now_s: the present time on the clock of the frames' times. A refused frame changes nothing.
   [[nodiscard]] FrameAnswer add(const TargetFrame& frame, double now_s);
 
-  // In order of birth. Those without identity may be false alarms.
+  // In order of birth. Targets without identity may be false alarms.
   [[nodiscard]] const std::vector<Target>& targets() const { return targets_; }
   // s; time of the newest frame. 0 before the first one.
   [[nodiscard]] double time_s() const { return time_s_; }
-  // Births refused because there were max_targets.
+  // Births refused because there were max_targets. Frames that are processed again count again.
   [[nodiscard]] std::int64_t births_refused() const { return births_refused_; }
 
  private:
@@ -133,7 +134,7 @@ class TargetTracker {
   std::vector<GatedPair> pairs_;
   std::vector<Innovation> innovations_;
   std::vector<double> weights_, missed_, claimed_;
-  // By detection: no other target may be seen in it and none born from it.
+  // For each detection, 1: no other target may be seen in it and none born from it.
   std::vector<char> taken_;
   std::vector<int> by_x_;
 };

@@ -4,7 +4,7 @@
 //   BrownDistortion    OpenCV's k1 k2 p1 p2                       inverse by Newton's method
 // A kind is a group of kCount terms: [i] is term i, kNames[i] its name, kOrders[i] its order.
 // A term of order n goes with f^n while the lens zooms (zoom_law.h).
-// distort() and undistort() fail beyond the radius at which the radial terms turn back.
+// distort() and undistort() fail at and beyond the radius at which the radial terms turn back.
 // Outputs are written on success only. Pure; no allocation. Derivation: docs/derivations.md.
 
 #include <Eigen/LU>
@@ -49,8 +49,9 @@ struct RadialDistortion {
 
   [[nodiscard]] S& operator[](int) { return radial; }
   [[nodiscard]] const S& operator[](int) const { return radial; }
-  // For code that names the term. With a second term no caller compiles: each must then say what
-  // becomes of the other. (A template, so that the compiler complains about the callers.)
+  // For code that names the only term. If a kind has a second term, the callers do not compile:
+  // each must then say what becomes of the other. (A template, so that the compiler names the
+  // callers.)
   template <int kTerms = kCount>
   [[nodiscard]] S& only_term() {
     static_assert(kTerms == 1, "names one term of several");
@@ -184,7 +185,7 @@ struct BrownDistortion {
   }
 };
 
-// Of Alidade's camera (camera.h).
+// The kind of Alidade's camera (camera.h).
 template <class S>
 using Distortion = RadialDistortion<S>;
 inline constexpr int kDistortionCount = Distortion<double>::kCount;

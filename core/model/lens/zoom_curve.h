@@ -81,6 +81,7 @@ class ZoomCurve {
     const auto begin = c_.is_between.begin();
     return static_cast<int>(std::count(begin, begin + c_.nodes, false));
   }
+  // Device units. The curve must not be empty.
   [[nodiscard]] double first_reading() const { return c_.reading[0]; }
   [[nodiscard]] double last_reading() const {
     return c_.reading[static_cast<std::size_t>(c_.nodes - 1)];

@@ -189,7 +189,7 @@ template <class S>
   return J;
 }
 
-// Its inverse.
+// The inverse of by_zoom_quantities().
 template <class S>
 [[nodiscard]] ZoomQuantityMatrix<S> zoom_quantities_by_camera(const Camera<S>& camera) {
   constexpr int kOfF = index(ZoomQuantity::kLogFocalLength);

@@ -10,7 +10,8 @@
 
 namespace alidade {
 
-// image: valid. scratch: room for `capacity` samples, at least 1.
+// image: valid. scratch: room for `capacity` samples, at least 1. An image below 3 x 3 px gives the
+// noise of rounding.
 [[nodiscard]] double image_noise(const ImageView& image, float* scratch, int capacity);
 
 struct RunningNoiseOptions {

@@ -4,7 +4,8 @@
 // larger image) and may be negative (an image stored bottom up). Coordinates: CONVENTIONS.md. They
 // are continuous, u right, v down; the centre of the first pixel is (0.5, 0.5).
 // The range of the grey levels is as the camera sends it, 0 to 255 or 16 to 235; nothing tells
-// which. The view neither owns nor checks the memory. The memory must outlive the view.
+// which. The view neither owns nor checks the memory. The memory must outlive the view, and must
+// not change while it is read.
 
 #include <cstddef>
 #include <cstdint>

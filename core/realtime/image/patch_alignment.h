@@ -57,8 +57,8 @@ enum class PrepareStatus {
                                     ReferencePatch* out);
 
 // Correction (px) to add to align()'s position for a patch prepared with A but seen as A (I + B),
-// to first order in B. Without the correction, a patch whose contrast is off its middle seems
-// displaced by the shift that B gives the contrast.
+// to first order in B. Without the correction, a patch whose contrast lies away from its middle
+// seems displaced by the shift that B gives the contrast.
 [[nodiscard]] inline Vector2<double> warp_displacement(const ReferencePatch& patch,
                                                        const Matrix2<float>& B) {
   return {patch.warp_moments_u.cwiseProduct(B).sum(), patch.warp_moments_v.cwiseProduct(B).sum()};
@@ -92,8 +92,9 @@ struct Alignment {
   int iterations = 0;
 };
 
-// start: px. *out is written on kConverged. For statistics also on kUnlike and kNotConverged; if
-// the gain is outside its limits, only position, gain and iterations mean something.
+// start: px. reference: from prepare(). *out is written on kConverged and, for statistics, on
+// kUnlike and kNotConverged. If the gain is outside its limits, only position, gain and iterations
+// mean something. A negative gain, as of an inverted contrast, is kUnlike.
 [[nodiscard]] AlignmentStatus align(const ReferencePatch& reference, const ImageView& image,
                                     const Vector2<double>& start, const AlignmentLimits& limits,
                                     Alignment* out);

@@ -2,11 +2,11 @@
 // Pyramid: an image at half, quarter, ... size. Each octave is the mean of 2x2 pixels of the
 // previous one, rounded to the nearest grey level (halves up).
 // Octave l has floor(width / 2^l) x floor(height / 2^l) pixels; a last odd column or row is
-// dropped. A point u of the image is exactly at u / 2^l of octave l, as pixel (i, j) covers [i,
-// i+1] x [j, j+1]. White noise of sigma grey levels becomes about sigma / 2^l. Each octave's
-// rounding adds a standard deviation of 0.3 and, as it rounds up, 1/8 of a grey level to the mean.
-// Octave 0 is the image itself, not a copy: the caller's memory must outlive its use. The
-// constructor takes all memory; build() allocates nothing and waits for nothing.
+// dropped. A point u of the image is exactly at u / 2^l of octave l. White noise of sigma grey
+// levels becomes about sigma / 2^l; each octave's rounding adds a standard deviation of 0.3, and
+// 1/8 of a grey level to the mean. Octave 0 is the image itself, not a copy: the caller's memory
+// must stay, unchanged, as long as octave 0 is used. The constructor takes all memory; build()
+// neither allocates nor waits.
 
 #include <array>
 #include <cstdint>

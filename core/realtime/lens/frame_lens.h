@@ -17,7 +17,7 @@ struct FrameLens {
   bool moves = false;
   // Slopes along the curve: change of the distortion in the corner (1) and of the optical centre
   // (px) per unit of log f. They carry distortion and centre from the reading's log f to the
-  // frame's, as a coarse reading may be off.
+  // frame's, as a coarse reading may be wrong. 0 where the curve does not zoom.
   CornerDistortion<double> corner_by_zoom = CornerDistortion<double>::Zero();
   Vector2<double> centre_by_zoom = Vector2<double>::Zero();
 };

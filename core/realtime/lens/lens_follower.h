@@ -100,13 +100,14 @@ class LensFollower {
   }
   // For the camera of look_through(); null: the map's lens.
   [[nodiscard]] const LensColumns* columns() const { return columns_ ? &*columns_ : nullptr; }
-  // Prior for a solution about this camera and rate (1/s).
+  // Prior for a solution about this camera and rate (1/s). To be called after look_through().
   [[nodiscard]] ZoomPrior prior(const Camera<double>& camera, double zoom_rate) const;
 
-  // zoom, zoom_rate: as solved. focal_length: px, with the correction, at phi = 0. The result's
-  // zoom is the caller's to set.
+  // zoom, zoom_rate: as solved with the prior of expected(). focal_length: px, with the correction,
+  // at phi = 0. The caller sets the result's zoom.
   [[nodiscard]] OwnLens learn(double time_s, const SolvedZoom& zoom, double focal_length,
                               double zoom_rate, const LensScale& scale);
+  // No landmarks held in this frame.
   void note_lost() { frames_lost_ += columns_ ? 1 : 0; }
   // True after frames_lost_for_good lost frames in a row, if there is a reading and it rests: then
   // neither the curve nor the previous frames lead to the lens.
@@ -133,7 +134,7 @@ class LensFollower {
   [[nodiscard]] bool is_young(double time_s) const {
     return judge_.remembers(track_.age_s(time_s));
   }
-  // Of the reading, which must exist.
+  // Belief in the reading, which must exist.
   [[nodiscard]] ReadingBelief belief(double time_s) const {
     return judge_.belief(track_.age_s(time_s));
   }

@@ -4,7 +4,7 @@
 // (lens_scale.h); the camera's is f exp(phi). A frame's prior is the previous state, extrapolated:
 //   log f' = log f + rate dt,   rate' = rate
 // log f and rate are driven by an acceleration that is constant between two frames and white from
-// frame to frame. Of a lens at rest the first frame counts fully. Later frames count less, as
+// frame to frame. While the lens rests, the first frame counts fully. Later frames count less, as
 // neighbouring frames share their landmarks' errors (variance_inflation(), covariance.h), and their
 // rate is taken as 0, not learnt. Fixed memory; no allocation. One thread.
 

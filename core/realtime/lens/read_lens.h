@@ -27,15 +27,15 @@ class ReadLens {
   [[nodiscard]] bool look_up(const ZoomCurve& curve, const ZoomReadings& readings, double readout_s,
                              FrameLens* lens);
   // The curve's lens at the focal length that landmarks showed lately, carried on at its rate.
-  // False: landmarks showed no focal length lately, or the curve does not reach it.
+  // False: landmarks showed no focal length lately, or lens_of_focal_length() has no lens for it.
   [[nodiscard]] bool as_found(const ZoomCurve& curve, FrameLens* lens) const;
   [[nodiscard]] double found_rate() const { return found_rate_; }  // 1/s, of log f
 
   // Landmarks of this frame show this lens. rate: 1/s, of log f.
   void note_found(const Calibration& found, double rate);
-  // Judges the frame's reading by the lens of note_found().
+  // Judges the frame's reading by the lens of note_found(), to be called after that.
   void judge(const Calibration& found);
-  // Of the reading that was judged last.
+  // Belief in the reading that was judged last.
   [[nodiscard]] ReadingBelief belief() const { return judge_.belief(age_s()); }
   // What landmarks showed no longer counts.
   void forget();
@@ -46,7 +46,7 @@ class ReadLens {
   ReadingJudge judge_;
   double time_s_ = 0;  // s, telemetry time, of the frame
   Calibration read_;   // by the readings, of the frame
-  // As landmarks last showed it. Focal length 0: they have not, or too long ago.
+  // The lens as landmarks last showed it. Focal length 0: they have not, or too long ago.
   double found_focal_length_ = 0;  // px
   double found_rate_ = 0;          // 1/s
   double found_time_s_ = 0;        // s, telemetry time

@@ -20,8 +20,8 @@ struct ReadingBeliefOptions {
   double excluded_sigmas = 5;
   double longest_s = 0.5;  // s, > 0; how long the lens that landmarks showed counts
   double fastest = 3;      // 1/s, > 0, of log f: 20 times in a second; no lens is faster
-  // Of log f, > 0. For kJumped a reading's sigma counts as at most this, as it grows without bound
-  // between readings far apart.
+  // Largest sigma of a reading's log f that counts for kJumped, > 0. The sigma itself grows without
+  // bound between readings far apart.
   double largest_sigma = 0.1;
 
   // False if a value is invalid. *error, if not null, then says which in one line.
@@ -49,11 +49,11 @@ class ReadingJudge {
 
   // age_s: since landmarks last showed the lens. True if that lens still counts.
   [[nodiscard]] bool remembers(double age_s) const { return age_s < options_.longest_s; }
-  // Of a frame's reading, age_s after landmarks last showed the lens.
+  // Belief in a frame's reading, age_s after landmarks last showed the lens.
   [[nodiscard]] ReadingBelief belief(double age_s) const {
     return excluded_ && remembers(age_s) ? ReadingBelief::kExcluded : ReadingBelief::kBelieved;
   }
-  // The same if also the change of the reading's log f since then is known, with its sigma.
+  // The same if the change of the reading's log f since then is known too, with its sigma.
   [[nodiscard]] ReadingBelief belief(double age_s, double change, double sigma) const {
     if (!remembers(age_s)) return ReadingBelief::kBelieved;
     if (excluded_) return ReadingBelief::kExcluded;

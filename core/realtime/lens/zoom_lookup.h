@@ -53,7 +53,7 @@ class ZoomLookup {
     double low = 0;
     double high = 0;
   };
-  // Of the two readings around the time and the one after them. Needs at least one reading.
+  // Range of the two readings around the time and the one after them. Needs at least one reading.
   [[nodiscard]] Range range_about(double time_s) const;
   // Index of the newer of the two readings around the time, or of the nearest. Needs at least one
   // reading.

@@ -15,8 +15,8 @@ class ZoomReadings {
   // tolerance: readings no further apart are one zoom. None: found from their jitter.
   explicit ZoomReadings(std::optional<double> tolerance) : steady_(tolerance) {}
 
-  // time_s: s, when it was received. reading: finite. True if zoom() differs from before, by
-  // however little.
+  // time_s: s, when it was received; in order. reading: finite. True if zoom() differs from before,
+  // by however little.
   bool take(double time_s, double reading);
   // Gives the telemetry time (s) of the reading taken last, for the look-ups below.
   void place(double time_s) {
@@ -25,8 +25,8 @@ class ZoomReadings {
   [[nodiscard]] const std::optional<double>& told() const { return told_; }  // as last reported
   [[nodiscard]] const std::optional<double>& zoom() const { return zoom_; }  // without jitter
 
-  // To be called when a calibration is adopted: if it has no zoom, it counts as made at the present
-  // zoom.
+  // To be called when a calibration is adopted. If it has no zoom, it counts as made at the present
+  // zoom or, without a reading so far, at the first one.
   void note_adoption() { zoom_at_adoption_ = zoom_; }
   // True if the present zoom is the calibration's, to the tolerance, or one of the two is unknown.
   // calibrated: the calibration's zoom; empty: that of note_adoption().

@@ -52,6 +52,7 @@ class BaseTie {
   // options: valid.
   explicit BaseTie(const BaseTieOptions& options) : options_(options) {}
 
+  // True once a measurement was taken.
   [[nodiscard]] bool is_tied() const { return is_tied_; }
   // True if s is known; z follows from it.
   [[nodiscard]] bool is_by_map() const { return is_by_map_; }

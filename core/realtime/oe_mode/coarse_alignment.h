@@ -5,7 +5,7 @@
 //   sum over patches of  | gain reference + offset - image(u + J_angle d) |^2
 // by Gauss-Newton, with a gain and offset for each patch. Patches whose own step disagrees with the
 // common one get less weight: they move by themselves or are hidden. Converges from within 1.5 px
-// of the coarsest octave. With a larger search_px, the best of a grid of shifts is taken first.
+// of the coarsest octave. If search_px is larger, the best of a grid of shifts is taken first.
 // Pure functions; no allocation.
 
 #include "core/model/angle.h"
@@ -14,14 +14,14 @@
 
 namespace alidade {
 
-// Of one octave; more are ignored.
+// Patches of one octave; more are ignored.
 inline constexpr int kMaxCoarsePatches = 256;
 
 struct CoarsePatch {
-  const ReferencePatch* reference = nullptr;
-  int octave = 0;           // < Pyramid::octaves()
-  Vector2<double> u;        // px of the image, predicted
-  Matrix2<double> J_angle;  // px/rad, d u / d (pan, tilt)
+  const ReferencePatch* reference = nullptr;  // never null; must stay during align_coarsely()
+  int octave = 0;                             // < Pyramid::octaves()
+  Vector2<double> u;                          // px of the image, predicted
+  Matrix2<double> J_angle;                    // px/rad, d u / d (pan, tilt)
 };
 
 struct CoarseOptions {

@@ -4,10 +4,10 @@
 //   sharing    = mean square of averages over sixths of the image / that of single residuals
 //   repetition = 1 + 2 sum of the correlations of these averages, 1 to kLags frames apart
 //   factor     = 1 + (sharing - 1) repetition
-// Squares are in units of what independent errors with the claimed covariances leave. What a sixth
-// of the image shares, the frame's angle, rate and acceleration share, too, and what the map takes
-// over from several frames. Learnt over some seconds of frames; 1 if errors are independent. No
-// allocation. One thread.
+// Squares are in units of what independent errors with the claimed covariances leave. An error that
+// a sixth of the image shares is in the frame's angle, rate and acceleration, too, and in what the
+// map takes over from several frames. Learnt over some seconds of frames; 1 if errors are
+// independent. No allocation. One thread.
 
 #include <array>
 #include <cstddef>
@@ -35,7 +35,7 @@ class ErrorSharing {
   ResidualSquares single_{kFirstFreedom, kFirstFreedom};
   ResidualSquares large_{kFirstFreedom, kFirstFreedom};
   std::array<LargeAverages, kLags> before_{};  // newest first
-  // Of the averages, 0 to kLags frames apart.
+  // Mean products of the averages, 0 to kLags frames apart.
   std::array<double, kLags + 1> products_{kFirstFreedom};
 };
 

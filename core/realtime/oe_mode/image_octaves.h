@@ -40,7 +40,7 @@ class ImageOctaves {
     octaves_.set_noise(noise_.sigma());
   }
 
-  // Of the last image built.
+  // The octaves of the last image built. The image's memory must stay, unchanged: see Pyramid.
   [[nodiscard]] const Pyramid& pyramid() const { return pyramid_; }
   [[nodiscard]] const Octaves& octaves() const { return octaves_; }
 

@@ -32,7 +32,7 @@ struct Landmark {
   Matrix2<double> covariance = Matrix2<double>::Zero();
   // rad^2, (pan, tilt) of the frame in which it was made: common to all landmarks made there.
   Matrix2<double> shared_covariance = Matrix2<double>::Zero();
-  // Of d in tangent_basis(d). All landmarks made with the calibration share its errors.
+  // Sensitivity of d in tangent_basis(d). All landmarks made with the calibration share its errors.
   LandmarkSensitivity sensitivity = LandmarkSensitivity::Zero();
   // d(reference pixel, px of its octave) / d(tangent_basis(d) coordinates, rad) when it was made,
   // with rolling shutter and distortion.

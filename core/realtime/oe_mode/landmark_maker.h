@@ -3,8 +3,8 @@
 // that show none yet (PTCEE 36).
 // Cells of octave l are cell_size_px * min(2^l, largest_cells) wide (px of the image). Fine octaves
 // are searched cell by cell, each time from another cell on, so that the budget reaches all cells
-// in turn. Of the coarse octaves one is searched completely each time. In a view with few landmarks
-// the budget does not limit.
+// in turn. One coarse octave is searched completely each time. In an empty view the budget
+// (max_new) does not limit.
 // The constructor takes all memory; nothing else allocates, waits or throws. One thread.
 
 #include <cstdint>

@@ -3,7 +3,7 @@
 // Directions are unit vectors in the map's frame: the base frame, except for an offset that OeMode
 // knows. Rings of constant latitude are divided into cells of about equal size. A cell holds at
 // most one landmark of each octave. Cells of octave l are 2^l times as wide as those of octave 0,
-// up to a largest size. With a zooming lens, a landmark made at 2^(zoom / 4) times the map's first
+// up to a largest size. If the lens zooms, a landmark made at 2^(zoom / 4) times the map's first
 // focal length has a cell 2^(-zoom / 4) times as wide, among those of its octave and zoom. A full
 // map replaces its least useful landmark by a new one: see worth().
 // The constructor takes all memory; nothing else allocates, waits or throws. One thread.
@@ -76,7 +76,7 @@ class LandmarkMap {
 
   // Usefulness, 0 to 1: high if the landmark is found when looked for. It falls with the time since
   // the last look, more slowly if the landmark was found often. A new landmark has 1/2 for 30
-  // frames, so that other new ones do not replace it.
+  // frames, so that other new ones do not replace it. occupied(slot).
   [[nodiscard]] double worth(int slot, std::uint32_t now) const;
 
  private:

@@ -51,7 +51,7 @@ class MaintainedMap {
     in_view_.change_lens(calibration, cone_margin_);
     shear_.change_lens(calibration);
   }
-  // The landmark in this slot, if it is still this one.
+  // Retires the landmark in this slot, if it still has this id.
   void retire(int slot, std::uint32_t id) {
     if (landmarks_.occupied(slot) && landmarks_.at(slot).id == id) landmarks_.retire(slot);
   }
@@ -63,7 +63,7 @@ class MaintainedMap {
   // The shear as seen by a frame at the tilt (rad) of the last look_at().
   [[nodiscard]] const MapShear& shear() const { return shear_; }
   void look_at(double tilt) { shear_.move_to(tilt); }
-  // In the map's cells, of landmarks made at this focal length (px): see LandmarkMap.
+  // The zoom, in the map's cells, of landmarks made at this focal length (px): see LandmarkMap.
   [[nodiscard]] int zoom_of(double focal_length) const;
 
   // Whether landmarks held in a frame, see MapUpkeep.
@@ -79,7 +79,7 @@ class MaintainedMap {
                                                    const ProcessedFrame& frame,
                                                    bool across_octaves);
 
-  // The shear that a map made in this frame has.
+  // Sets the shear to that of a map made in this frame.
   void begin_shear(const ProcessedFrame& frame) { shear_.begin(frame.motion, frame.covariance); }
   // For a frame that landmarks answered. Returns the correction by which the landmarks were
   // straightened; none while the lens moves.

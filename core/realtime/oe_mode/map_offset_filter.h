@@ -3,11 +3,11 @@
 // frames that wait for telemetry.
 //   base angle = map angle + offset
 // A frame with extrapolated telemetry waits until telemetry encloses its time; only then the filter
-// learns from it. Up to kMaxPending frames wait; of more, the oldest is dropped. A frame counts
-// less if the same samples, landmarks or angles were used before (variance_inflation(),
-// offset_cells.h). A learnt focal length joins the filter: (offset, phi), see lens_scale.h. An
-// innovation that contradicts offset and landmarks is rejected. Fixed memory; no allocation. One
-// thread. Derivation: docs/oe_mode.md.
+// learns from it. Up to kMaxPending frames wait; one more drops the oldest. A frame counts less if
+// the same samples, landmarks or angles were used before (variance_inflation(), offset_cells.h). A
+// learnt focal length joins the filter: (offset, phi), see lens_scale.h. An innovation that
+// contradicts offset and landmarks is rejected. Fixed memory; no allocation. One thread.
+// Derivation: docs/oe_mode.md.
 
 #include <array>
 #include <cstddef>
@@ -54,7 +54,7 @@ struct MapOffset {
                            const Vector2<double>& by_lens, double max_chi_square, LensScale* lens);
 };
 
-// rad^2, of (pan, tilt) that depend on the parameters like this.
+// rad^2; variance that the calibration's covariance gives (pan, tilt) with this sensitivity.
 [[nodiscard]] inline Vector2<double> variance_by(const Calibration& calibration,
                                                  const Sensitivity<2>& sensitivity) {
   return (sensitivity * calibration.covariance).cwiseProduct(sensitivity).rowwise().sum();
@@ -148,7 +148,8 @@ class MapOffsetFilter {
   // A frame was answered with telemetry that was not extrapolated. False if the innovation is
   // beyond max_contradiction: the offset then stays, and the cells keep what was seen.
   bool learn(double frame_time_s, const OffsetInnovation& innovation);
-  // True once for each frame that was learnt from, or that telemetry contradicted.
+  // The latest frame that was learnt from, or that telemetry contradicted. False, and *out is
+  // unchanged, if it was taken before or there is none.
   [[nodiscard]] bool take_seen(SeenOffset* out);
   // Telemetry contradicted the landmarks in a frame. The cells keep it, as the error may depend on
   // the angle.
@@ -159,7 +160,8 @@ class MapOffsetFilter {
   void add_pending(const PendingFrame& frame);
   // The oldest pending frame, if telemetry up to newest_sample_s encloses its time; else null.
   [[nodiscard]] const PendingFrame* enclosed(double newest_sample_s) const;
-  // Drops the oldest pending frame. Learns from it if `late` is neither null nor extrapolated.
+  // Drops the oldest pending frame, if there is one. Learns from it if `late` is neither null nor
+  // extrapolated.
   void settle_oldest(const Calibration& calibration, const InterpolatedPanTilt* late);
   void forget_pending() { pending_count_ = 0; }
   [[nodiscard]] std::size_t pending() const { return pending_count_; }

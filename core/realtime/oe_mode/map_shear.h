@@ -1,13 +1,11 @@
 #pragma once
-// MapShear: how far all landmarks may be sheared together, and what neighbouring frames show of the
-// shear. The first frame's landmarks are placed with telemetry's rate; the rate's error times the
-// row's time is in their directions, and in those of all later landmarks. The angles of
-// neighbouring frames reveal this error: the derivatives in the middle of the curve through kCurve
-// angles are compared with the rate and acceleration that the map showed there, by a Kalman filter
-// (docs/oe_mode.md).
-// State of each axis: covariance of the errors of (angle, rate, acceleration) in a frame that looks
-// at tilt(), due to the shear. The angle's error counts from the map's beginning. Fixed memory; no
-// allocation. One thread.
+// MapShear: how far all landmarks may be sheared together. The first frame's landmarks are placed
+// with telemetry's rate. The rate's error times the row's time is in their directions and passes on
+// to later landmarks. Neighbouring frames reveal it: a Kalman filter compares the derivatives of
+// the curve through kCurve angles, in its middle, with the rate and acceleration that the map
+// showed there (docs/oe_mode.md). State of each axis: covariance of the errors of (angle, rate,
+// acceleration) in a frame that looks at tilt(), due to the shear. The angle's error counts from
+// the map's beginning. Fixed memory; no allocation. One thread.
 
 #include <array>
 #include <cstddef>
@@ -98,7 +96,9 @@ class MapShear {
   // Angles before and after this call are not on one curve.
   void begin_curve() { frame_count_ = 0; }
   // The correction to apply, with half_readout_s of the last frame; the state here already includes
-  // it. Empty if there are too few frames, lenses that differ, or no rolling shutter.
+  // it. Empty if there are too few frames, lenses that differ, or no rolling shutter. An axis
+  // beyond max_surprise has the correction 0, and its variances of rate and acceleration grow by
+  // `doubt`.
   [[nodiscard]] std::optional<ShearCorrection> correct();
 
   [[nodiscard]] const Covariances& covariances() const { return covariances_; }

@@ -3,9 +3,9 @@
 // without it, from the previous frame.
 // From telemetry: its angles and rates in true units, minus the map's offset, and its acceleration
 // if InterpolatedPanTilt::acceleration_sigma is below acceleration_fields. From the previous frame:
-// its angle and rate, extrapolated. The covariance allows for an error of the acceleration: with
-// the smaller of these two sigmas, after a previous frame with acceleration_fields. No allocation.
-// One thread.
+// its angle and rate, extrapolated. The covariance allows for an error of the acceleration. Its
+// sigma is the smaller of these two for telemetry, and acceleration_fields for the previous frame.
+// No allocation. One thread.
 
 #include "core/model/calibration.h"
 #include "core/model/rolling_shutter.h"
@@ -17,7 +17,7 @@
 namespace alidade {
 
 struct MotionPredictionOptions {
-  // Fields of view per s^2, > 0; sigma of either axis. A weak prior, for frames with few landmarks.
+  // Fields of view per s^2, > 0; sigma of each axis. A weak prior, for frames with few landmarks.
   double acceleration_fields = 10;
   double longest_s = 0.5;  // s, > 0; longest extrapolation without telemetry
 
@@ -64,7 +64,8 @@ class MotionPrediction {
   [[nodiscard]] bool follows(double frame_time_s) const {
     return has_last_ && since_last_s(frame_time_s) < options_.longest_s;
   }
-  // s, in either direction of time; 0 without a previous frame.
+  // s, >= 0; time between the previous frame and this one, whichever is first. 0 without a previous
+  // frame.
   [[nodiscard]] double since_last_s(double frame_time_s) const;
   // The previous motion, extrapolated with its acceleration. Needs follows(frame_time_s).
   [[nodiscard]] FrameMotion<double> last_carried_on(double frame_time_s) const;

@@ -53,11 +53,11 @@ class Octaves {
   [[nodiscard]] bool is_coarse(int octave) const { return octave >= options_.first_coarse; }
   [[nodiscard]] double noise_sigma() const { return noise_sigma_; }
 
-  // Grey levels, of one octave's pixels: averaging reduces it to rounding.
+  // Grey levels, of one octave's pixels: averaging reduces it, down to that of rounding.
   [[nodiscard]] double noise(int octave) const {
     return std::max(std::ldexp(noise_sigma_, -octave), options_.least_noise);
   }
-  // Grey levels per pixel, for prepare(). With less a patch's covariance is too small.
+  // Grey levels per pixel, for prepare(). A patch with less contrast has too small a covariance.
   [[nodiscard]] double least_contrast(int octave) const {
     return options_.least_contrast * noise(octave);
   }

@@ -1,15 +1,12 @@
 #pragma once
 // OeMode: a frame's orientation from telemetry and landmarks, to a few hundredths of a pixel (PTCEE
-// sections V-A, V-C). Derivation: docs/oe_mode.md. Steps: see process() and maintain().
-// One estimator for OE and PT: without landmarks the solution is telemetry's, with its covariance.
-// If landmarks contradict telemetry beyond both covariances, the answer is telemetry's with a
-// covariance that covers both, and the mode is PT.
-// What drifts against telemetry is no ground (scene_drift.h): its landmarks are retired, and none
-// are made there for a while (moving_directions.h). While it is not known what stands still, the
-// answer is telemetry's.
-// Map, offset and answer carry their dependence on the calibration (Sensitivity). The answer's
-// covariance includes the calibration's.
-// Fixed memory, taken by the constructor; nothing else allocates, waits or throws. One thread.
+// sections V-A, V-C). One estimator for OE and PT: without landmarks the solution is telemetry's,
+// with its covariance. If landmarks contradict telemetry beyond both covariances, the answer is
+// telemetry's with a covariance that covers both, and the mode is PT. What drifts against telemetry
+// is not ground (scene_drift.h): no landmarks are kept there. Map, offset and answer carry their
+// dependence on the calibration (Sensitivity); the answer's covariance includes the calibration's.
+// Memory is fixed, taken by the constructor. Nothing waits or throws, and only map_state()
+// allocates. One thread. Derivation: docs/oe_mode.md.
 
 #include <cstddef>
 #include <cstdint>
@@ -42,7 +39,7 @@ enum class OeStatus {
   kOk,             // orientation from landmarks and telemetry
   kTooFew,         // too few landmarks held: telemetry alone
   kContradiction,  // landmarks and telemetry exclude each other: telemetry, covering both
-  kSceneMoves,     // what is in view moves, or it is not known what of it: telemetry alone
+  kSceneMoves,     // what is in view moves, or it is not known what stands still: telemetry alone
   // No telemetry, and no recent frame, image or landmarks instead; or a calibration that reset()
   // cannot use: nothing is written.
   kNoPrediction,
@@ -59,8 +56,8 @@ struct OeStatistics {
   int found = 0;               // by patch alignment
   int inliers = 0;             // in agreement with the solution
   double coarse_shift_px = 0;  // px at the image's centre, correction by coarse alignment
-  // With kOk, at the middle row: what landmarks and telemetry show in the map's frame. Frames with
-  // the same `map` share that frame.
+  // Set with kOk, at the middle row: what landmarks and telemetry show in the map's frame. Frames
+  // with the same `map` share that frame.
   PanTilt<double> angle;                                            // rad, true, not wrapped
   PanTilt<double> rate;                                             // rad/s, true
   std::uint32_t map = 0;                                            // count of the maps so far
@@ -78,6 +75,18 @@ struct TelemetryLookUp {
   double time_sigma_s = 0;  // s
 };
 
+// process(), then maintain(), for each frame:
+//   1 predict pan and tilt from telemetry or the previous frame   motion_prediction.h
+//   2 coarse alignment in pan and tilt (PTCEE 30, 31)             landmark_search.h
+//   3 choose landmarks, align them, rolling shutter (32, 33)      landmark_search.h
+//   4 solve motion and offset robustly, telemetry as prior (35)   orientation_solve.h
+//     If few hold, repeat 3 and 4 from where the previous frame leads.
+//   5 answer, and learn the map's offset                          map_offset_filter.h
+//   maintain():
+//     leave out what moves                                        scene_drift.h
+//   6 refine and retire landmarks (PTCEE 36)                      map_upkeep.h
+//   7 straighten the map by neighbouring frames                   map_shear.h
+//   8 make landmarks where cells are empty                        landmark_maker.h
 class OeMode {
  public:
   // options: valid.
@@ -92,21 +101,15 @@ class OeMode {
   // The same with this map: made with this calibration, by this mount, with no restart since that
   // moved its zero. OE mode starts with its first frame. Invalid landmarks, and those without room,
   // are left out; an invalid map is ignored. Real-time safe: 0.3 us per landmark.
-  // A handed-over map is believed as far as images confirm it. It is forgotten if telemetry
-  // contradicts it for 50 frames. Landmarks that should be in view are forgotten if 50 frames show
-  // other things.
+  // A handed-over map is believed as far as images confirm it. MapUpkeepOptions say after how many
+  // frames it is forgotten because telemetry contradicts it, and after how many its unproven
+  // landmarks are, because images show other things.
   void reset(const Calibration& calibration, const MapState& map,
              FocalLength focal_length = FocalLength::kCalibrated);
 
-  // Steps:
-  //   1 predict pan and tilt from telemetry or the previous frame   motion_prediction.h
-  //   2 coarse alignment in pan and tilt (PTCEE 30, 31)             landmark_search.h
-  //   3 choose landmarks, align them, rolling shutter (32, 33)      landmark_search.h
-  //   4 solve motion and offset robustly, telemetry as prior (35)   orientation_solve.h
-  //     If few hold, repeat 3 and 4 from where the previous frame leads.
-  //   5 answer, and learn the map's offset                          map_offset_filter.h
   // frame_time_s: t0, row 0 on the image clock. at_middle_row: telemetry at t0 + clock_offset +
-  // line_delay * height / 2; null if there is none. The image must outlive the next maintain().
+  // line_delay * height / 2; null if there is none. The image must stay, unchanged, until the next
+  // maintain() returns.
   // *out is valid with every status but kNoPrediction and kNotFinite.
   // Extrapolated telemetry is a prior for this frame only: the map's offset does not learn from it,
   // and the frame becomes pending.
@@ -135,11 +138,9 @@ class OeMode {
   [[nodiscard]] bool has_followed_lens() const { return calibration_.lens().follows(); }
 
   // Upkeep of the map with the last frame (processed_frame.h), to be called after its answer is
-  // out. Does nothing if that frame has no sure orientation.
-  //     leave out what moves                        scene_drift.h
-  //   6 refine and retire landmarks (PTCEE 36)      map_upkeep.h
-  //   7 straighten the map by neighbouring frames   map_shear.h
-  //   8 make landmarks where cells are empty        landmark_maker.h
+  // out. A frame without a sure orientation neither refines nor makes landmarks. A map that does
+  // not fit is forgotten after any frame: if it is useless (map_upkeep.h), if its lens is lost for
+  // good (lens_follower.h), or if it followed what moves.
   void maintain();
 
   // Late telemetry. True, with *look_up, if telemetry up to newest_sample_s (telemetry clock)
@@ -153,8 +154,8 @@ class OeMode {
   void forget_pending();
 
   // Announces a measurement of the last frame's orientation in an outer base, such as a scene
-  // map's. Replaces an earlier one. False if the frame has no answer. Once measured, all answers,
-  // also PT's, are in that base, whatever becomes of map and calibration (base_tie.h).
+  // map's. Replaces an earlier one. False if the frame has no answer. Once it is measured, all
+  // answers are in that base, PT's too, even if map or calibration change (base_tie.h).
   bool ask_about_base() { return tie_.ask(); }
   // The measurement. False if what is known is better, or if none was announced or it is invalid.
   bool settle_base(const BaseMeasurement& measurement) {
@@ -167,7 +168,7 @@ class OeMode {
   // finite; *out is then unchanged.
   [[nodiscard]] bool put_into_base(FrameOrientation* out) const;
 
-  // Of the last processed frame.
+  // Statistics of the last processed frame.
   [[nodiscard]] const OeStatistics& statistics() const { return statistics_; }
   // statistics().found observations. Residuals and inliers are the solution's or, without one, the
   // prediction's.

@@ -20,7 +20,7 @@ struct LookOptions {
   // px, at the image's centre: largest sigma of a prediction at which fine landmarks are looked for
   // although the coarse octaves do not fit.
   double nearby_px = 2;
-  // 0 to 1; share of the chosen landmarks. With fewer inliers there is a second look, where the
+  // 0 to 1; share of the chosen landmarks. If fewer are inliers, there is a second look, where the
   // previous motion leads, as the coarse octaves can match a repeated texture elsewhere.
   double least_held = 0.6;
   // Inliers that a second look needs, as fewer can agree by chance.

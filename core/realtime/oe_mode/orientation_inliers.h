@@ -15,7 +15,7 @@ namespace alidade::internal {
 // Least number of landmarks for 6 unknowns, whatever the limits say.
 inline constexpr int kMinInliers = 3;
 
-// By landmark.
+// One value for each landmark.
 using Squares = std::array<double, kMaxFoundLandmarks>;  // residuals, normalised by covariance
 using Weights = std::array<double, kMaxFoundLandmarks>;  // 0 to 1
 

@@ -34,7 +34,7 @@ struct Given {
   double unit_s;
 };
 
-// Solution of (x, g), scaled. With a learnt lens at phi = 0.
+// Solution of (x, g), scaled; at phi = 0 if the lens is learnt.
 struct Posterior {
   Vector8 solution = Vector8::Zero();
   Matrix8 covariance = Matrix8::Zero();
@@ -54,9 +54,9 @@ struct Posterior {
 
 // Without telemetry's angles and without a learnt lens: the landmarks' own solution.
 [[nodiscard]] Posterior posterior_of_landmarks(const FromLandmarks& landmarks);
-// With telemetry, and without a learnt lens.
+// For a frame with telemetry, and without a learnt lens.
 [[nodiscard]] Posterior solve_with_offset(const Given& given, const FromLandmarks& landmarks);
-// With a learnt lens. Writes out->lens and out->zoom, and *x at the value of phi. False if a result
+// For a learnt lens. Writes out->lens and out->zoom, and *x at the value of phi. False if a result
 // is not finite.
 [[nodiscard]] bool solve_with_lens(const Given& given, const FromLandmarks& landmarks,
                                    Posterior* posterior, MotionAndLens* x, SolvedMotion* out);

@@ -73,7 +73,9 @@ struct ScaledZoomPrior {
 
 class OrientationProblem {
  public:
-  // lens: null if phi is known to be 0. zoom: null if the frame's lens is the map's.
+  // count: at most kMaxFoundLandmarks. landmarks and lens must outlive this object; only `inlier`
+  // of a landmark may change. lens: null if phi is known to be 0. zoom: null if the frame's lens is
+  // the map's; needs `lens`.
   OrientationProblem(FoundLandmark* landmarks, int count, double unit_s, const LensScale* lens,
                      const ZoomPrior* zoom)
       : landmarks_(landmarks),

@@ -18,7 +18,7 @@
 
 namespace alidade {
 
-// Of one frame; more are ignored.
+// Landmarks of one frame; more are ignored, and their outputs are not written.
 inline constexpr int kMaxFoundLandmarks = 1024;
 
 // One found landmark.
@@ -50,7 +50,7 @@ struct MotionPrior {
   Sensitivity<4> telemetry_sensitivity = Sensitivity<4>::Zero();
   // rad^2, of g, before this frame.
   Matrix2<double> offset_covariance = Matrix2<double>::Zero();
-  // Of (angle, rate) from the previous frames, and of acceleration. As information, which may be 0.
+  // Prior of (angle, rate) from the previous frames, and of acceleration. Its information may be 0.
   Vector6 motion = Vector6::Zero();  // expected minus predicted
   Matrix6 motion_information = Matrix6::Zero();
   Sensitivity<6> motion_sensitivity = Sensitivity<6>::Zero();
@@ -64,18 +64,18 @@ struct MotionPrior {
   double sharing = 1;
 };
 
-// Of residuals, relative to what independent errors with the claimed covariances leave.
+// Squares of residuals, relative to what independent errors with the claimed covariances leave.
 struct ResidualSquares {
   double sum = 0;
   double freedom = 0;  // degrees
 };
-// Of both components, by cell.
+// Averages of both components, by cell.
 inline constexpr std::size_t kLargeCellCount = 6;
 using LargeAverages = std::array<double, 2 * kLargeCellCount>;
 
 enum class SolveStatus {
   kOk,
-  kTooFew,         // inliers
+  kTooFew,         // landmarks or inliers
   kContradiction,  // between landmarks and telemetry
   kNotFinite
 };
@@ -138,13 +138,13 @@ struct SolveLimits {
 };
 
 // width, height: px, of the image. half_readout_s: s, any sign; scale of the rows' times.
-// Robust (orientation_inliers.h): up to half of the landmarks may be wrong. Writes the landmarks'
-// outputs. *out is complete with kOk. With kContradiction it has the squares, the landmarks' common
-// error and the innovation, which then lacks what phi explains; no correction.
-// Covariance: that of the linear problem, multiplied by the factor by which squares of residuals
-// exceed their covariances; residuals count single or averaged over neighbours (within a tenth of
-// the image's width), as averages reveal common errors. It is multiplied by prior.sharing, too. The
-// landmarks' shared covariance, averaged with their weights, is added.
+// Robust (orientation_inliers.h): up to half of the landmarks may be wrong. *out and the landmarks'
+// outputs are complete with kOk. With kContradiction *out has the squares, the landmarks' common
+// error and the innovation, which then lacks what phi explains; no correction. With other statuses
+// *out must not be used. Covariance: that of the linear problem, times prior.sharing and the factor
+// by which squares of residuals exceed their covariances: the larger one of single residuals and of
+// averages within a tenth of the image's width, which reveal common errors. The landmarks' shared
+// covariance is added.
 [[nodiscard]] SolveStatus solve_orientation(FoundLandmark* landmarks, int count,
                                             const MotionPrior& prior, const SolveLimits& limits,
                                             double width, double height, double half_readout_s,

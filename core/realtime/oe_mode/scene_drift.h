@@ -1,13 +1,12 @@
 #pragma once
-// SceneDrift: do the map's landmarks stand still? Over seconds telemetry shows which are ground.
-// Each landmark has a rate in the map's frame, from its places over some seconds, and the map has a
-// rate against telemetry, from its offsets. A rate is the (pan, tilt) rate by which the camera
-// would have to turn for the same change in the image, rad/s; for ground the sum of both rates is
-// zero. Landmarks form one group, or two groups of one rate each: clouds before a mountain. Of two
-// groups telemetry shows which is at rest; until then the verdict is kUndecided. A single group
-// that is not at rest moves, if its rate is steady: play and sway are not steady, and a rate that
-// follows the angle is the gear's. Then a new map has to prove itself. The constructor takes all
-// memory; nothing else allocates, waits or throws. One thread.
+// SceneDrift: do the map's landmarks stand still? Each landmark has a rate in the map's frame, from
+// its places over some seconds, and the map has a rate against telemetry, from its offsets. A rate
+// (pan, tilt; rad/s) is that by which the camera would have to turn for the same change in the
+// image; for ground the sum of both rates is zero. Landmarks form one group, or two of one rate
+// each: clouds before a mountain. Telemetry shows which of two is at rest; until then the verdict
+// is kUndecided. A single group moves if its rate is steady: play and sway are not steady, and a
+// rate that follows the angle is the gear's. Then a new map has to prove itself. The constructor
+// takes all memory; nothing else allocates, waits or throws. One thread.
 
 #include <array>
 #include <cstddef>
@@ -23,7 +22,7 @@ namespace alidade {
 
 enum class SceneVerdict {
   kRest,       // as far as can be seen
-  kUndecided,  // of two groups either may be at rest
+  kUndecided,  // two groups: it is not known yet which is at rest
   kPartMoves,  // the landmarks of the group apart, which the map does not follow
   kMapMoves,   // the landmarks of the other group, which the map follows
   kAllMove
@@ -52,17 +51,18 @@ class SceneDrift {
   void note(const SeenOffset& seen);
   // Begins a frame in which landmarks held. rate: rad/s, the camera's.
   void begin_frame(double time_s, const Vector2<double>& rate);
-  // d: unit, where it was found, in the map's frame. Ignored at elevations beyond +-1.4 rad, and
-  // beyond kMaxFoundLandmarks landmarks of a frame.
+  // slot: below the map's capacity. d: unit, where it was found, in the map's frame. Ignored if d
+  // is not finite, at elevations beyond +-1.4 rad, and beyond kMaxFoundLandmarks landmarks of a
+  // frame.
   void note_landmark(int slot, std::uint32_t id, const Vector3<double>& d);
   // The verdict on that frame. pixel: rad, the angle of one pixel.
   SceneVerdict judge(double pixel);
 
-  // By the latest verdict. A withheld answer is telemetry's.
+  // True if, by the latest verdict, the answer is telemetry's although landmarks held.
   [[nodiscard]] bool withholds() const { return on_trial_ || verdict_ == SceneVerdict::kUndecided; }
   // A new map has to prove itself, as what was in view before moved.
   [[nodiscard]] bool is_on_trial() const { return on_trial_; }
-  // rad^2, of (pan, tilt): by how much the map may have drifted along with what moves, although no
+  // rad^2, of (pan, tilt): how far the map may have drifted along with what moves, although no
   // verdict says so yet.
   [[nodiscard]] const Matrix2<double>& doubt() const { return doubt_; }
   // True if doubt() is from less than a second of telemetry: its noise alone then often gives some.

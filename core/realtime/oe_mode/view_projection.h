@@ -29,6 +29,7 @@ struct SeenDirection {
 
 class ViewProjection {
  public:
+  // calibration: image height > 0.
   ViewProjection(const Calibration& calibration, const FrameMotion<double>& motion)
       : camera_(calibration.camera),
         line_delay_(calibration.line_delay),
@@ -50,8 +51,8 @@ class ViewProjection {
     to_middle_row_ = camera_.focal_length / calibration.camera.focal_length;
   }
 
-  // False if the camera has no pixel for it, its row is too far outside the image, or the row does
-  // not converge; the output is then not to be used, here and below.
+  // False if the camera has no pixel for it, its row is too far outside the image, or the row is
+  // not unique or does not converge; the output is then not to be used, here and below.
   [[nodiscard]] bool project(const Vector3<double>& d, Vector2<double>* u) const {
     Path path;
     return find(d, &path, u);
@@ -141,7 +142,7 @@ class ViewProjection {
     if (line_delay_ == 0) return true;
     double row = middle_row_;
     double v = u->y();
-    // Also, a difference quotient over a step of mere rounding would be meaningless.
+    // A difference quotient over a step of mere rounding would be meaningless, too.
     if (std::abs(v - row) < kTolerance) return true;
     double slope = 0;
     for (int step = 0; step < kMaxSteps; ++step) {

@@ -17,8 +17,8 @@ struct VisibleLandmark {
   Vector2<double> u;  // px of the image, predicted to about a pixel; all its patch is in the image
 };
 
-// By how many octaves a landmark appears larger at this focal length (px) than in its reference
-// image; negative: smaller.
+// Number of octaves by which a landmark appears larger at this focal length (px) than in its
+// reference image; negative: smaller.
 [[nodiscard]] int octaves_larger(const Landmark& landmark, double focal_length);
 
 class VisibleLandmarks {

@@ -1,13 +1,12 @@
 #pragma once
 // StartUpTracker: keypoint tracks from the video of an uncalibrated camera, for the first
-// calibration (PTCEE section V-A). Uses no focal length, distortion, read-out, mount or telemetry,
-// so a wrong value of these cannot do harm.
+// calibration (PTCEE section V-A). Uses no focal length, distortion, read-out, mount or telemetry.
 // An observation is the place of a landmark in a frame: px, as in CONVENTIONS.md. Its covariance is
 // that of errors which differ between the observations of a landmark (docs/derivations.md). A point
 // ends if it leaves the image, is warped too far, keeps moving against the others, or is not found
-// in two successive frames; later it is a new landmark.
-// Shifts of up to a third of the image between frames are followed; frames with nothing in common
-// end all points. Only the constructor allocates; nothing waits or throws after it. One thread.
+// in two successive frames; later it is a new landmark. Shifts of up to a third of the image
+// between frames are followed; frames with nothing in common end all points. Only the constructor
+// allocates; nothing waits or throws after it. One thread.
 
 #include <array>
 #include <cstddef>
@@ -64,18 +63,16 @@ class StartUpTracker {
   StartUpTracker& operator=(const StartUpTracker&) = delete;
 
   // Steps:
-  //   1 the whole image's shift since the previous frame, to 2^l px, by comparing all shifts of a
-  //   small octave
-  //   2 the motion of the points, coarse to fine, as one smooth function of the position
-  //   (smooth_flow.h)
-  //   3 each point is aligned with its image in the frame where it was found, so that nothing
-  //   drifts; the image is warped by the gradients of the motion since then (patch_alignment.h)
+  //   1 shift of the whole image since the previous frame, to a pixel of a small octave
+  //   2 motion of the points, coarse to fine, as one smooth function (smooth_flow.h)
+  //   3 each point is aligned with its first image, warped by the gradients of the motion since
+  //     then, so that nothing drifts (patch_alignment.h)
   //   4 points that contradict the others' motion are rejected
   //   5 new points, FAST corners, are made at places without any
-  // The image need not outlive the call.
+  // The image is used during the call only.
   [[nodiscard]] StartUpStatus process(const ImageView& image);
 
-  // Of the last processed frame.
+  // Results of the last processed frame.
   [[nodiscard]] const TrackObservation* observations() const { return observations_.data(); }
   [[nodiscard]] int observation_count() const { return observation_count_; }
   [[nodiscard]] const StartUpStatistics& statistics() const { return statistics_; }

@@ -36,7 +36,7 @@ class AngleStep {
       if (measure_ == 0) measure_ = moved;
       const double multiple = moved / measure_;
       const double rest = std::abs(multiple - std::round(multiple)) * measure_;
-      if (multiple > kMostMultiple) return;  // says nothing of so small a measure
+      if (multiple > kMostMultiple) return;  // does not test so small a measure
       if (rest < kExact * measure_) {
         if (changed > 0.5 * measure_) ++agreed_;
         return;

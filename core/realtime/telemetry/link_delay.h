@@ -44,7 +44,7 @@ enum class LinkDelayState {
 
 class LinkDelay {
  public:
-  static constexpr double kRange_s = 0.5;       // either way
+  static constexpr double kRange_s = 0.5;       // earlier and later
   static constexpr double kOpenSigma_s = 0.15;  // of a uniform distribution from 0 to 0.5 s
 
   // angle_sigma: rad, of the white noise of a sample, > 0. connections_sigma_s: one standard
@@ -53,7 +53,8 @@ class LinkDelay {
 
   // The calibration's clock offset was found through this connection.
   void begin_calibrated();
-  // The connection is another one. sigma_s: of its delay, until motion shows it.
+  // The connection is another one. sigma_s: of its delay, until motion shows it. Until then
+  // delay_s() stays as it was.
   void open(double sigma_s = kOpenSigma_s);
   // Another calibration is used, whose clock offset is larger by by_s and was found through yet
   // another connection. What is known of this connection's delay stays.
@@ -61,9 +62,10 @@ class LinkDelay {
   // The angles of the next image do not continue those before.
   void break_images();
 
-  // error_variance: rad^2, (pan, tilt), of an error that samples at neighbouring angles share, as
-  // what is left of a gear's. Ignored: values that are not finite; a sample that is not later than
-  // the last one, or repeats its angles.
+  // error_variance: rad^2, (pan, tilt), of an error that samples at neighbouring angles share, such
+  // as the rest of a gear's error. Ignored: values that are not finite; a sample that is not later
+  // than the last one, or repeats its angles. An image that is not later than the last one, or
+  // later by 0.3 s or more, begins a new motion.
   void add(const TelemetrySample& sample,
            const Vector2<double>& error_variance = Vector2<double>::Zero());
   void add(const ImageAngles& image);
@@ -82,7 +84,7 @@ class LinkDelay {
   static constexpr std::size_t kImages = 256;
   static constexpr std::size_t kSamples = 256;
 
-  // Of the residuals of one axis, at each candidate.
+  // Sums over the residuals of one axis, at each candidate.
   struct Sums {
     std::array<double, kCandidates> squares{};  // about the mean of each stretch
     std::array<double, kCandidates> lagged{};   // products of neighbours, likewise

@@ -106,6 +106,7 @@ class TelemetryBuffer {
                 "a power of two");
 
  public:
+  // noise, limits: validate() must accept them.
   explicit TelemetryBuffer(const TelemetryNoise& noise = {}, const TelemetryLimits& limits = {})
       : noise_(noise), limits_(limits) {}
 

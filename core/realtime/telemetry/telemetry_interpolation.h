@@ -15,12 +15,13 @@
 
 namespace alidade {
 
+// All values are >= 0; pan_tilt_sigma and resolution must not both be 0.
 struct TelemetryNoise {
   double pan_tilt_sigma = 1e-4;   // rad, white noise of one measured angle
   double resolution = 0;          // rad, smallest step of a measured angle; 0: none
   double period_sigma_s = 50e-6;  // s, of the time between two neighbouring samples
-  // rad/s^2, one standard deviation; acceleration expected of either axis if the samples do not
-  // show it: near a jerk, and with too few samples. Beyond the samples it is the lower limit of
+  // rad/s^2, one standard deviation; acceleration expected of each axis if the samples do not show
+  // it: near a jerk, and with too few samples. Beyond the samples it is the lower limit of
   // ExpectedAcceleration. 0: the mount keeps its rate.
   double acceleration_sigma = 0.1;
 
@@ -90,8 +91,8 @@ class ExpectedAcceleration {
 
 inline constexpr int kInterpolationWindow = 8;
 
-// knots[0..count): 2 <= count <= kInterpolationWindow, times strictly ascending. time_s lies
-// between knots[before] and knots[before + 1], or beyond the nearer end. beyond_square:
+// noise: valid. knots[0..count): 2 <= count <= kInterpolationWindow, times strictly ascending.
+// time_s lies between knots[before] and knots[before + 1], or beyond the nearer end. beyond_square:
 // (rad/s^2)^2, (pan, tilt), expected accelerations beyond the ends.
 // Does not write error_variance, error_length, acceleration and acceleration_sigma. False if the
 // result cannot be represented; *out is then unchanged.
