@@ -29,8 +29,7 @@ std::vector<ZoomStretch> find_zoom_stretches(const std::vector<ZoomReading>& rea
            !is_one(stretches[before - 1], reading.zoom, options)) {
       --before;
     }
-    const bool returned = before > 0 &&
-                          is_one(stretches[before - 1], reading.zoom, options) &&
+    const bool returned = before > 0 && is_one(stretches[before - 1], reading.zoom, options) &&
                           reading.time_s - stretches[before - 1].end_s < options.glitch_s;
     if (returned) {
       stretches.resize(before);

@@ -11,7 +11,6 @@
 #include <cstdio>
 #include <deque>
 #include <filesystem>
-#include <fstream>
 #include <limits>
 #include <mutex>
 #include <optional>
@@ -24,6 +23,7 @@
 #include "edge_app/pipeline/read_loop.h"
 #include "platform/storage/recording_writer.h"
 #include "platform/system/text.h"
+#include "platform/system/whole_file.h"
 
 namespace alidade {
 namespace {
@@ -48,16 +48,20 @@ void prepare_directory(const std::string& directory) {
 
 // Writes what the configuration states and a later calibration or replay needs.
 void write_side_files(const Config& config, const std::string& directory) {
+  const auto write = [&directory](const char* name, const std::string& text) {
+    std::string error;
+    if (!write_file_atomically((fs::path(directory) / name).string(), text, &error))
+      throw CommandError(kExitFailed, error);
+  };
   if (config.pan_tilt.angle_sigma_rad) {
-    std::ofstream(fs::path(directory) / "noise.yaml")
-        << fmt::format("pan_tilt_sigma_rad: {}\n", *config.pan_tilt.angle_sigma_rad);
+    write("noise.yaml", fmt::format("pan_tilt_sigma_rad: {}\n", *config.pan_tilt.angle_sigma_rad));
   }
   // The focal length of a zoom lens is not known in advance.
   if (config.camera.focal_length_px && !config.camera.focal_length_range) {
     const Camera<double>& camera = data_sheet_calibration(config.camera).camera;
-    std::ofstream(fs::path(directory) / "guess.yaml")
-        << fmt::format("focal_length: {{value: {}}}\nradial_distortion: {{value: {}}}\n",
-                       camera.focal_length, camera.distortion.only_term());
+    write("guess.yaml",
+          fmt::format("focal_length: {{value: {}}}\nradial_distortion: {{value: {}}}\n",
+                      camera.focal_length, camera.distortion.only_term()));
   }
 }
 

@@ -524,6 +524,10 @@ TEST(OeMode, NeedsACalibrationThatItHasRoomFor) {
   oe.maintain();
   oe.reset(camera.calibration());
   EXPECT_EQ(oe.process(camera.image(0), 0, &telemetry, &frame), OeStatus::kTooFew);
+  oe.maintain();
+  EXPECT_GT(oe.map().size(), 0);
+  oe.reset(large);
+  EXPECT_EQ(oe.map().size(), 0);
 }
 
 // Telemetry that ends 80 ms before each frame, and tells of it two frames later.
