@@ -19,7 +19,7 @@ const kFigures = {
 
 // An SVG element; attributes only, as the page's policy wants it.
 export function svg(name, attributes, ...children) {
-  const made = document.createElementNS('http://www.w3.org/2000/svg', name);
+  const made = document.createElementNS(element('motion').namespaceURI, name);
   for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
   made.append(...children);
   return made;
