@@ -312,15 +312,10 @@ def mark(axis, events, first_s):
             axis.axvline(events[name]["receive_time_s"] - first_s, color="k", ls=style, lw=1, label=name)
 
 
-def plain(value, _):
-    """A tick's number as people write it: 0.05, 2, 100."""
-    return f"{value:g}"
-
-
 def plain_axis(axis, numbers, unit=""):
-    """A logarithmic axis with a number at each of its ticks, in place of powers of ten."""
+    """A logarithmic axis with numbers as people write them (0.05, 2, 100) at its ticks, in place of powers of ten."""
     axis.set_major_locator(matplotlib.ticker.LogLocator(base=10, subs=numbers))
-    axis.set_major_formatter(lambda value, place: plain(value, place) + unit)
+    axis.set_major_formatter(lambda value, _: f"{value:g}{unit}")
     axis.set_minor_formatter(matplotlib.ticker.NullFormatter())
 
 

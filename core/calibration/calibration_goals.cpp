@@ -21,21 +21,53 @@ const char* to_string(HelpfulMotion motion) {
 
 ParameterGoals calibration_goals(const Camera<double>& camera) {
   static_assert(kDistortionCount == 1, "each term is to be known well enough");
-  const auto goal = [](Parameter parameter, const char* unit, double wanted, HelpfulMotion helps) {
-    ParameterGoal out;
-    out.parameter = parameter;
-    out.unit = unit;
-    out.wanted = wanted;
-    out.helps = helps;
-    return out;
-  };
-  return {goal(Parameter::kFocalLength, "px", kMaxFocalLengthError * camera.focal_length,
-               HelpfulMotion::kFarther),
-          goal(Parameter::kClockOffset, "s", kMaxClockOffsetError_s, HelpfulMotion::kVaried),
-          goal(Parameter::kLineDelay, "s/row", kMaxReadoutError_s / camera.height,
-               HelpfulMotion::kFaster),
-          goal(Parameter::kRadialDistortion, "1", kMaxDistortionError * corner_unit(camera)[0],
-               HelpfulMotion::kAcross)};
+  const double f = camera.focal_length;
+  const double corner = corner_unit(camera)[0];
+  return {{{Parameter::kFocalLength,
+            "px",
+            "focal length",
+            100 / f,
+            "%",
+            kMaxFocalLengthError * f,
+            {},
+            false,
+            HelpfulMotion::kFarther},
+           {Parameter::kClockOffset,
+            "s",
+            "clock offset",
+            1e3,
+            "ms",
+            kMaxClockOffsetError_s,
+            {},
+            false,
+            HelpfulMotion::kVaried},
+           {Parameter::kLineDelay,
+            "s/row",
+            "read-out",
+            1e3 * camera.height,
+            "ms",
+            kMaxReadoutError_s / camera.height,
+            {},
+            false,
+            HelpfulMotion::kFaster},
+           {Parameter::kRadialDistortion,
+            "1",
+            "radial distortion",
+            100 / corner,
+            "%",
+            kMaxDistortionError * corner,
+            {},
+            false,
+            HelpfulMotion::kAcross}}};
+}
+
+ParameterGoals calibration_goals(const Calibration& calibration) {
+  ParameterGoals goals = calibration_goals(calibration.camera);
+  for (ParameterGoal& goal : goals) {
+    goal.sigma = parameter_sigma(calibration, goal.parameter);
+    goal.reached = *goal.sigma <= goal.wanted;
+  }
+  return goals;
 }
 
 const ParameterGoal* farthest_goal(const ParameterGoals& goals) {

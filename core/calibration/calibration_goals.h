@@ -24,6 +24,9 @@ enum class HelpfulMotion : std::uint8_t {
 struct ParameterGoal {
   Parameter parameter = Parameter::kCount;
   const char* unit = "";        // of sigma and wanted; as the parameter has it
+  const char* name = "";        // for people
+  double easy = 1;              // factor from `unit` to easy_unit
+  const char* easy_unit = "";   // a unit in which a sigma is easily judged: %, ms
   double wanted = 0;            // the largest sigma that is good enough
   std::optional<double> sigma;  // empty: no adjustment has come so far
   // sigma is small enough, or nothing that the camera films could make it smaller: a focal length
@@ -35,6 +38,8 @@ using ParameterGoals = std::array<ParameterGoal, 4>;
 
 // The goals for this camera, without sigmas. camera: focal length and size > 0.
 [[nodiscard]] ParameterGoals calibration_goals(const Camera<double>& camera);
+// The same with the calibration's sigmas. `reached` is by sigma alone.
+[[nodiscard]] ParameterGoals calibration_goals(const Calibration& calibration);
 
 // The goal with the largest ratio of sigma to what is wanted, among those not reached; null: all
 // are reached, or have no sigma.

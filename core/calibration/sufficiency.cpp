@@ -110,24 +110,15 @@ void describe_weakest(CalibrationResult* result) {
   result->quality.weakest_direction = words;
 }
 
-// How well a parameter is known, in the unit in which that is easily judged.
-std::string known_to(const ParameterGoal& goal, const Calibration& c, const MotionExtent& motion) {
-  switch (goal.parameter) {
-    case Parameter::kFocalLength:
-      return text("focal length known to %.1f %% only, %g %% are needed",
-                  100 * relative_focal_length_sigma(c), 100 * kMaxFocalLengthError);
-    case Parameter::kClockOffset:
-      return text("clock offset known to %.1f ms only, %g ms are needed (largest rate %.3f rad/s)",
-                  1e3 * *goal.sigma, 1e3 * kMaxClockOffsetError_s, motion.largest_rate.norm());
-    case Parameter::kLineDelay:
-      return text("read-out known to %.1f ms only, %g ms are needed",
-                  1e3 * *goal.sigma * c.camera.height, 1e3 * kMaxReadoutError_s);
-    case Parameter::kRadialDistortion:
-      return text("radial distortion known to %.1f %% of the radius only, %g %% are needed",
-                  100 * *goal.sigma / corner_unit(c.camera)[0], 100 * kMaxDistortionError);
-    default:
-      return std::string(to_string(goal.parameter)) + " is known too little";
-  }
+// In the unit in which it is easily judged.
+std::string known_to(const ParameterGoal& goal, const MotionExtent& motion) {
+  const bool of_radius = goal.parameter == Parameter::kRadialDistortion;
+  std::string out = goal.name + text(" known to %.1f ", goal.easy * *goal.sigma) + goal.easy_unit +
+                    (of_radius ? " of the radius" : "") + " only, " +
+                    text("%g ", goal.easy * goal.wanted) + goal.easy_unit + " are needed";
+  if (goal.parameter == Parameter::kClockOffset)
+    out += text(" (largest rate %.3f rad/s)", motion.largest_rate.norm());
+  return out;
 }
 
 }  // namespace
@@ -262,13 +253,11 @@ void judge(const CalibrationOptions& options, const MotionExtent& motion,
              "a whole turn or a wider field of view would separate them",
              relative_focal_length_sigma(c), options.pan_scale.sigma));
   }
-  ParameterGoals& goals = result->goals.emplace(calibration_goals(c.camera));
+  ParameterGoals& goals = result->goals.emplace(calibration_goals(c));
   for (ParameterGoal& goal : goals) {
-    goal.sigma = parameter_sigma(c, goal.parameter);
-    goal.reached = *goal.sigma <= goal.wanted ||
-                   (goal.parameter == Parameter::kFocalLength && scale_from_prior);
+    goal.reached |= goal.parameter == Parameter::kFocalLength && scale_from_prior;
     if (goal.reached) continue;
-    reasons.push_back(known_to(goal, c, motion) + ": " + to_string(goal.helps));
+    reasons.push_back(known_to(goal, motion) + ": " + to_string(goal.helps));
   }
   for (const Parameter p :
        {Parameter::kPanAxis0, Parameter::kPanAxis1, Parameter::kTiltAxis0, Parameter::kTiltAxis1}) {

@@ -1,9 +1,11 @@
 #include "core/pattern/known_pattern.h"
 
+#include <algorithm>
 #include <array>
 #include <cctype>
 #include <cmath>
 #include <cstddef>
+#include <cstdio>
 #include <cstdlib>
 #include <locale>
 #include <sstream>
@@ -206,6 +208,24 @@ std::optional<KnownPattern> parse_pattern(const std::string& text, std::string* 
     pattern.gap = *gap;
   }
   return pattern;
+}
+
+std::string to_string(const KnownPattern& pattern) {
+  const auto* const kind = std::find_if(
+      kKinds.begin(), kKinds.end(), [&](const NamedKind& one) { return one.kind == pattern.kind; });
+  char text[120];
+  std::snprintf(text, sizeof text, "%s:%dx%d:%gmm", kind->name, pattern.columns, pattern.rows,
+                1000 * pattern.size_m);
+  std::string name = text;
+  if (pattern.kind == PatternKind::kAprilGrid) {
+    std::snprintf(text, sizeof text, ":%g", pattern.gap);
+    name += text;
+  } else if (pattern.kind == PatternKind::kCharuco) {
+    std::snprintf(text, sizeof text, ":%gmm:%s", 1000 * pattern.marker_m,
+                  kMarkerDictionaries[static_cast<std::size_t>(pattern.dictionary)].name);
+    name += text;
+  }
+  return name;
 }
 
 }  // namespace alidade

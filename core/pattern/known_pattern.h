@@ -60,5 +60,7 @@ struct KnownPattern {
 // marker smaller than its square, a dictionary with enough markers.
 [[nodiscard]] std::optional<KnownPattern> parse_pattern(const std::string& text,
                                                         std::string* error);
+// As parse_pattern() reads it; lengths in mm.
+[[nodiscard]] std::string to_string(const KnownPattern& pattern);
 
 }  // namespace alidade

@@ -172,39 +172,6 @@ Shapes shapes_of(const KnownPattern& pattern) {
   return circles(pattern);
 }
 
-const char* kind_name(PatternKind kind) {
-  switch (kind) {
-    case PatternKind::kChessboard:
-      return "chessboard";
-    case PatternKind::kAsymmetricCircles:
-      return "circles";
-    case PatternKind::kSymmetricCircles:
-      return "symmetric-circles";
-    case PatternKind::kAprilGrid:
-      return "aprilgrid";
-    case PatternKind::kCharuco:
-      break;
-  }
-  return "charuco";
-}
-
-// As parse_pattern() reads it.
-std::string name_of(const KnownPattern& pattern) {
-  char text[120];
-  std::snprintf(text, sizeof text, "%s:%dx%d:%gmm", kind_name(pattern.kind), pattern.columns,
-                pattern.rows, 1000 * pattern.size_m);
-  std::string name = text;
-  if (pattern.kind == PatternKind::kAprilGrid) {
-    std::snprintf(text, sizeof text, ":%g", pattern.gap);
-    name += text;
-  } else if (pattern.kind == PatternKind::kCharuco) {
-    std::snprintf(text, sizeof text, ":%gmm:%s", 1000 * pattern.marker_m,
-                  kMarkerDictionaries[static_cast<std::size_t>(pattern.dictionary)].name);
-    name += text;
-  }
-  return name;
-}
-
 // What a person measures to know that size, in words.
 const char* size_name(PatternKind kind) {
   switch (kind) {
@@ -248,7 +215,7 @@ std::string caption_of(const KnownPattern& pattern, const Shapes& shapes,
       "100 %%.</text>\n",
       kLine_mm, kRuler_mm, kRuler_mm + 2, kLine_mm, kRuler_mm, kRuler_mm);
   out += text;
-  const std::string name = name_of(pattern);
+  const std::string name = to_string(pattern);
   std::snprintf(text, sizeof text,
                 "<text x=\"0\" y=\"11\">Alidade --pattern %s, %.0f x %.0f mm on %s</text>\n",
                 name.c_str(), shapes.width_mm, shapes.height_mm, paper.c_str());

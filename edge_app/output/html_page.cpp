@@ -78,6 +78,12 @@ std::string html_list(const std::string& title, const std::vector<std::string>& 
   return list + "</ul>\n";
 }
 
+std::string html_verdict(const char* kind, const std::string& number, const std::string& limit,
+                         const std::string& words) {
+  return fmt::format("<li class=\"{}\"><b>{}</b> <span class=\"soft\">({})</span>: {}</li>\n", kind,
+                     number, limit, escape_html(words));
+}
+
 std::string html_figure(const std::string& caption, const std::string& svg) {
   return fmt::format("<figure><figcaption>{}</figcaption>\n<div class=\"plot\">{}</div></figure>\n",
                      caption, svg);

@@ -15,6 +15,14 @@ namespace alidade {
 [[nodiscard]] std::string html_list(const std::string& title,
                                     const std::vector<std::string>& lines);
 
+// The beginning of a list of verdicts, before items of html_verdict() and "</ul>".
+inline constexpr const char* kHtmlVerdicts =
+    "<h2>What the numbers say</h2>\n<ul class=\"verdicts\">\n";
+// A number, what it is held against, and what that means. kind: good: as it should be; grown:
+// allowed for, at a price; weak: beyond the limit. number, limit: HTML; words: plain text.
+[[nodiscard]] std::string html_verdict(const char* kind, const std::string& number,
+                                       const std::string& limit, const std::string& words);
+
 // caption: HTML; svg: a plot.
 [[nodiscard]] std::string html_figure(const std::string& caption, const std::string& svg);
 

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <string>
 
+#include "core/calibration/calibration_goals.h"
 #include "core/calibration/number_text.h"
-#include "core/model/lens/zoom_law.h"
 #include "core/model/recording_needs.h"
 #include "edge_app/output/report_page.h"
 #include "edge_app/self_calibration/checked_calibration.h"
@@ -12,11 +12,9 @@
 namespace alidade::report {
 namespace {
 
-// good: as it should be; grown: allowed for, at a price; weak: beyond the limit.
 void add(ReportPage& page, const char* kind, const std::string& number, const std::string& limit,
          const std::string& words) {
-  page.add("<li class=\"{}\"><b>{}</b> <span class=\"soft\">({})</span>: {}</li>\n", kind, number,
-           limit, escape_html(words));
+  page.add("{}", html_verdict(kind, number, limit, words));
 }
 
 // ratio: residuals over their noise, 1 unless they differ beyond chance.
@@ -36,14 +34,19 @@ void add_noise(ReportPage& page, const char* of, const char* stated, double rati
       fmt::format("1 is as {}; live, more than {:g} is refused", stated, most), words);
 }
 
-void add_sigma(ReportPage& page, const char* what, double sigma, double limit, const char* unit,
-               const char* of_what) {
+void add_sigma(ReportPage& page, const ParameterGoal& goal) {
   constexpr double kFar = 50;
-  if (!(sigma > 0)) return;  // exact
+  if (!(*goal.sigma > 0)) return;  // exact
+  const double sigma = goal.easy * *goal.sigma;
+  const double limit = goal.easy * goal.wanted;
+  const char* const of_what = goal.parameter == Parameter::kLineDelay ? " for the whole picture"
+                              : goal.parameter == Parameter::kRadialDistortion
+                                  ? " of the radius in the corner"
+                                  : "";
   const bool holds = sigma <= limit;
   add(page, holds ? "good" : "weak",
-      fmt::format("{} known to {} {}", what, sigma_text(sigma), unit),
-      fmt::format("limit {:g} {}{}", limit, unit, of_what),
+      fmt::format("{} known to {} {}", goal.name, sigma_text(sigma), goal.easy_unit),
+      fmt::format("limit {:g} {}{}", limit, goal.easy_unit, of_what),
       !holds                 ? "too uncertain"
       : limit > kFar * sigma ? fmt::format("more than {:g} times better than needed", kFar)
                              : fmt::format("{:.2g} times better than needed", limit / sigma));
@@ -52,12 +55,10 @@ void add_sigma(ReportPage& page, const char* what, double sigma, double limit, c
 }  // namespace
 
 void verdicts(ReportPage& page) {
-  constexpr double kPercent = 100;
   constexpr double kRepeats = 1.1;
   const CalibrationQuality& q = page.result().quality;
-  const Calibration& c = page.result().calibration;
   const CalibrationChecks checks;
-  page.add("<h2>What the numbers say</h2>\n<ul class=\"verdicts\">\n");
+  page.add("{}", kHtmlVerdicts);
   add_noise(page, "image", "the tracks state", q.pixel_sigma_ratio, checks.worst_pixel_ratio);
   const bool repeats = q.repetition > kRepeats;
   add(page, repeats ? "grown" : "good", fmt::format("repetition {:.1f}", q.repetition),
@@ -67,16 +68,8 @@ void verdicts(ReportPage& page) {
                             q.repetition, std::sqrt(q.repetition))
               : "image errors do not repeat");
   add_noise(page, "telemetry", "assumed", q.telemetry_sigma_ratio, checks.worst_telemetry_ratio);
-  add_sigma(page, "focal length", kPercent * relative_focal_length_sigma(c),
-            kPercent * kMaxFocalLengthError, "%", "");
-  add_sigma(page, "clock offset", kMilli * parameter_sigma(c, Parameter::kClockOffset),
-            kMilli * kMaxClockOffsetError_s, "ms", "");
-  add_sigma(page, "read-out", kMilli * parameter_sigma(c, Parameter::kLineDelay) * c.camera.height,
-            kMilli * kMaxReadoutError_s, "ms", " for the whole picture");
-  static_assert(kDistortionCount == 1, "a line for each term");
-  add_sigma(page, "distortion",
-            kPercent * parameter_sigma(c, Parameter::kRadialDistortion) / corner_unit(c.camera)[0],
-            kPercent * kMaxDistortionError, "%", " of the radius in the corner");
+  for (const ParameterGoal& goal : calibration_goals(page.result().calibration))
+    add_sigma(page, goal);
   if (q.contradiction) {
     const bool refused = q.contradiction->scatter > kMaxScatter && q.causes.empty();
     add(page, refused ? "weak" : "grown",

@@ -306,13 +306,6 @@ Between knowledge_between(const ZoomCurve& curve) {
   return out;
 }
 
-// A number, what it is held against, and what that means.
-std::string verdict_line(const char* kind, const std::string& number, const std::string& limit,
-                         const std::string& words) {
-  return fmt::format("<li class=\"{}\"><b>{}</b> <span class=\"soft\">({})</span>: {}</li>\n", kind,
-                     number, limit, words);
-}
-
 std::string verdicts_of(const ZoomReportInput& report) {
   constexpr double kNear = 3;   // standard deviations of a chi-square that chance explains
   constexpr double kNode = 3;   // sigmas of a dwell that chance explains
@@ -321,8 +314,8 @@ std::string verdicts_of(const ZoomReportInput& report) {
   const double two_cameras = ZoomFitOptions().two_cameras;
   const int freedom = std::max(1, fit.degrees_of_freedom);
   const double excess = (fit.chi_square - freedom) / std::sqrt(2.0 * freedom);
-  std::string out = "<h2>What the numbers say</h2>\n<ul class=\"verdicts\">\n";
-  out += verdict_line(
+  std::string out = kHtmlVerdicts;
+  out += html_verdict(
       excess > kNear ? "grown" : "good",
       fmt::format("chi-square {:.1f}, {} expected", fit.chi_square, fit.degrees_of_freedom),
       fmt::format("chance explains up to {:.0f}; above {:.0f} it would be two cameras",
@@ -339,7 +332,7 @@ std::string verdicts_of(const ZoomReportInput& report) {
     worst = sigmas;
     worst_reading = dwell.zoom;
   }
-  out += verdict_line(
+  out += html_verdict(
       worst > kNode ? "grown" : "good",
       fmt::format("worst dwell {:.1f} sigmas off the curve, at reading {:.4g}", worst,
                   worst_reading),
@@ -348,7 +341,7 @@ std::string verdicts_of(const ZoomReportInput& report) {
                     : "all dwells lie on one curve");
   const Between known = knowledge_between(fit.curve);
   out +=
-      verdict_line(known.worst > kOe ? "grown" : "good",
+      html_verdict(known.worst > kOe ? "grown" : "good",
                    fmt::format("f known to {:.2g} % (median), {:.2g} % (worst, at reading {:.4g})",
                                kPercent * known.usual, kPercent * known.worst, known.worst_reading),
                    fmt::format("OE mode begins at once at {:g} % or better", kPercent * kOe),

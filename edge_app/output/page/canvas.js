@@ -71,3 +71,16 @@ export function axes({pen, width, height}, x, y) {
   pen.fillText(x.name, right, height - 4);
   return at;
 }
+
+// Axes as large in both directions, around the ranges xs and ys: [least, largest]. room: how much more than the ranges is
+// shown; least: of y over the whole height. names: of x and y. Gives back where a point is, and the size of a pixel, too.
+export function equalAxes(drawn, xs, ys, {room, least}, names) {
+  const {width, height} = drawn;
+  const unit = Math.max(room * (xs[1] - xs[0]) / (width - 66), room * (ys[1] - ys[0]) / (height - 54), least / height);
+  const span = (ends, size, name) => {
+    const half = unit * size / 2;
+    const middle = (ends[0] + ends[1]) / 2;
+    return {from: middle - half, to: middle + half, step: niceStep(2 * half, size < 300 ? 3 : 5), name};
+  };
+  return {...axes(drawn, span(xs, width - 66, names[0]), span(ys, height - 54, names[1])), unit};
+}

@@ -2,7 +2,7 @@
 // Dashed: what the picture shows.
 
 import {postJson} from './api.js';
-import {axes, colour, niceStep, surface} from './canvas.js';
+import {colour, equalAxes, surface} from './canvas.js';
 import {rows, say} from './elements.js';
 import {isNumber, kDegree, withSigma} from './numbers.js';
 import {chooseFree, ellipse, labelsOf, seenLastFirst, targetColour, targetName} from './target_names.js';
@@ -59,14 +59,8 @@ export function drawPlan() {
   const shown = walked.length > 0 ? walked : seen;
   const range = (i) => shown.length > 0 ? [Math.min(...shown.map((one) => one[i])), Math.max(...shown.map((one) => one[i]))] : [0, 0];
   const [xs, ys] = [range(0), range(1)];
-  // As large in both directions.
-  const unit = Math.max(1.4 * (xs[1] - xs[0]) / (drawn.width - 66), 1.4 * (ys[1] - ys[0]) / (drawn.height - 54), (onPlane ? 20 : 1) / drawn.height);
-  const span = (ends, size, name) => {
-    const half = unit * size / 2;
-    const middle = (ends[0] + ends[1]) / 2;
-    return {from: middle - half, to: middle + half, step: niceStep(2 * half, size < 300 ? 3 : 5), name};
-  };
-  const at = axes(drawn, span(xs, drawn.width - 66, onPlane ? 'x, m' : 'azimuth, \u00b0'), span(ys, drawn.height - 54, onPlane ? 'y, m' : 'elevation, \u00b0'));
+  const at = equalAxes(drawn, xs, ys, {room: 1.4, least: onPlane ? 20 : 1},
+    onPlane ? ['x, m', 'y, m'] : ['azimuth, \u00b0', 'elevation, \u00b0']);
   const {pen} = drawn;
   pen.save();
   pen.beginPath();
@@ -89,7 +83,7 @@ export function drawPlan() {
     pen.stroke();
     if (!target.covariance) continue;  // at a pole
     const [x, y] = trail[trail.length - 1];
-    const factor = (onPlane ? 1 : kDegree) / unit;
+    const factor = (onPlane ? 1 : kDegree) / at.unit;
     // Upwards is down on a canvas.
     const [long, short, turn] = ellipse(target.covariance.map((row) => row.slice(0, 2)));
     pen.beginPath();

@@ -2,7 +2,7 @@
 // Hidden while no scene map is in use.
 
 import {getJson, postJson} from './api.js';
-import {axes, colour, niceStep, surface} from './canvas.js';
+import {colour, equalAxes, surface} from './canvas.js';
 import {element, say} from './elements.js';
 import {isNumber, kDegree} from './numbers.js';
 import {onNewProcess, record} from './stream.js';
@@ -50,15 +50,7 @@ export function drawSceneMap() {
   const here = present.length > 2 ? unrolled(present, first) : [];
   const all = [...places, here].flat();
   const range = (i) => all.length > 0 ? [Math.min(...all.map((one) => one[i])), Math.max(...all.map((one) => one[i]))] : [-1, 1];
-  const [xs, ys] = [range(0), range(1)];
-  // As large in both directions.
-  const unit = Math.max(1.1 * (xs[1] - xs[0]) / (drawn.width - 66), 1.1 * (ys[1] - ys[0]) / (drawn.height - 54));
-  const span = (ends, size, name) => {
-    const half = unit * size / 2;
-    const middle = (ends[0] + ends[1]) / 2;
-    return {from: middle - half, to: middle + half, step: niceStep(2 * half, size < 300 ? 3 : 5), name};
-  };
-  const at = axes(drawn, span(xs, drawn.width - 66, 'azimuth, \u00b0'), span(ys, drawn.height - 54, 'elevation, \u00b0'));
+  const at = equalAxes(drawn, range(0), range(1), {room: 1.1, least: 0}, ['azimuth, \u00b0', 'elevation, \u00b0']);
   const {pen} = drawn;
   const outline = (border) => {
     pen.beginPath();

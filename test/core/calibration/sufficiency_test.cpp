@@ -80,7 +80,7 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& limit) { return std::string(to_string(limit.param.parameter)); });
 
 TEST(CalibrationGoals, TheFarthestIsTheOneWhoseSigmaIsMostTimesWhatIsWanted) {
-  ParameterGoals goals = calibration_goals({2000, 1, {0}, 1920, 1080});
+  ParameterGoals goals = calibration_goals(Camera<double>{2000, 1, {0}, 1920, 1080});
   EXPECT_EQ(farthest_goal(goals), nullptr);  // none has a sigma yet
   for (ParameterGoal& goal : goals) goal.sigma = 2 * goal.wanted;
   goals[2].sigma = 3 * goals[2].wanted;

@@ -26,6 +26,13 @@ TEST(KnownPattern, ReadsWhatAPersonWrites) {
   EXPECT_DOUBLE_EQ(parsed("aprilgrid:6x6:0.03m:0.3").gap, 0.3);
 }
 
+TEST(KnownPattern, IsWrittenAsItIsRead) {
+  for (const char* text : {"chessboard:9x6:25mm", "circles:4x11:20mm", "symmetric-circles:7x6:20mm",
+                           "aprilgrid:6x6:30mm:0.3"}) {
+    EXPECT_EQ(to_string(parsed(text)), text);
+  }
+}
+
 TEST(KnownPattern, SaysWhatIsWrongInOneLine) {
   test::expect_refused({
       {"", "no pattern is given"},

@@ -116,7 +116,7 @@ TEST_F(HttpApiTest, StatusTellsHowFarACalibrationIs) {
   const auto told = [this] { return body_of(get("/api/v1/status"))["calibration"]["progress"]; };
   EXPECT_TRUE(told().is_null());
   CalibrationProgress progress;
-  progress.goals = calibration_goals({2000, 1, {0}, 1920, 1080});
+  progress.goals = calibration_goals(Camera<double>{2000, 1, {0}, 1920, 1080});
   progress.travel = travel_limits(2000, 1920);
   progress_ = std::make_shared<const CalibrationProgress>(progress);
   json first = told();
