@@ -38,31 +38,52 @@ BaseJudge::Verdict BaseJudge::judge(const OrientationRecord& record, const Local
       angle_covariance(J_xi_angle, found.pose.covariance.topLeftCorner<3, 3>());
   const Matrix2<double> of_record = angle_covariance(
       J_xi_angle, Eigen::Map<const Matrix3<double>>(record.orientation->covariance_rad2.data()));
-  Matrix2<double> expected = of_map + of_record;
-  offset->covariance = expected;
-  if (!record.localized) {
-    expected.diagonal().array() += options_.zero_sigma * options_.zero_sigma;
+  const Matrix2<double> of_change = of_map + of_record;
+  PanTilt<double> before;
+  Matrix2<double> of_before = Matrix2<double>::Zero();
+  if (record.localized) {
+    before = record.localized->telemetry_zero;
+    const auto& packed = record.localized->zero_covariance;
+    of_before << packed[0], packed[1], packed[1], packed[2];
   }
-  const PanTilt<double> before =
-      record.localized ? record.localized->telemetry_zero : PanTilt<double>{};
+  offset->covariance = of_change + of_before;
   offset->zero = {before.pan + change.x(), before.tilt + change.y()};
   offset->roll = log_so3<double>(R_by_angles.transpose() * R_localized).z();
   told->change_rad = {change.x(), change.y()};
   told->covariance = {of_map(0, 0), of_map(0, 1), of_map(1, 1)};
   told->moved = false;
 
-  if (!is_beyond(change, expected)) {
+  Matrix2<double> of_zero = offset->covariance + told_.covariance;
+  of_zero.diagonal().array() += options_.zero_sigma * options_.zero_sigma;
+  const bool is_zero_beyond = is_beyond(minus(offset->zero, told_.zero), of_zero);
+  if (!is_zero_beyond && !(record.localized && is_beyond(change, of_change))) {
     suspected_.reset();
-    return Verdict::kExpected;
+    return is_vague(record, of_change) ? Verdict::kVague : Verdict::kExpected;
   }
-  const bool confirmed = suspected_ && !is_beyond(minus(offset->zero, suspected_->zero),
-                                                  offset->covariance + suspected_->covariance);
-  suspected_ = *offset;
+  // What both have in common, such as the zero known before, confirms nothing.
+  const BaseOffset suspected = {offset->zero, of_change, offset->roll};
+  const bool confirmed = suspected_ && !is_beyond(minus(suspected.zero, suspected_->zero),
+                                                  suspected.covariance + suspected_->covariance);
+  suspected_ = suspected;
   if (!confirmed) return Verdict::kSuspected;
   if (!options_.correct) return Verdict::kReported;
   suspected_.reset();
+  told_ = *offset;
   told->moved = true;
   return Verdict::kMoved;
+}
+
+// A record that is tied follows the zero wherever it has gone. Where movements are not to be
+// corrected, a first tie therefore waits until the record could show one, but not for ever.
+bool BaseJudge::is_vague(const OrientationRecord& record, const Matrix2<double>& covariance) {
+  constexpr double kLongest_s = 60;
+  const double most = options_.zero_sigma * options_.zero_sigma;
+  if (options_.correct || record.localized || covariance.diagonal().maxCoeff() < most) {
+    vague_since_s_.reset();
+    return false;
+  }
+  if (!vague_since_s_) vague_since_s_ = *record.time_s;
+  return *record.time_s - *vague_since_s_ < kLongest_s;
 }
 
 }  // namespace alidade

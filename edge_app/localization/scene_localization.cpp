@@ -196,6 +196,7 @@ SceneLocator::Outcome SceneLocalization::judge(const LocalizableFrame& frame,
       }
       return Outcome::kTold;
     case BaseJudge::Verdict::kSuspected:
+    case BaseJudge::Verdict::kVague:
       return Outcome::kOnceMore;
     case BaseJudge::Verdict::kMoved:
       say_moved(told->frame, offset, true);

@@ -64,6 +64,7 @@ struct OrientationRecord {
     double sigma_rad = 0;  // that the tie adds to a direction: root mean square of pan and tilt
     // rad, to be added to telemetry's true angles to be in the map's base.
     PanTilt<double> telemetry_zero;
+    std::array<double, 3> zero_covariance{};  // rad^2, of it: pan, pan with tilt, tilt
   };
   std::optional<Localized> localized;
   std::optional<double> latency_s;  // s, record made minus receive time; empty with recordings

@@ -58,9 +58,12 @@ void OrientationStep::note_tie(OrientationRecord* record) const {
   const TiedOffset zero = oe_->telemetry_zero();
   const Matrix2<double>& covariance =
       oe_->tie().is_by_map() ? oe_->tie().of_map().covariance : zero.covariance;
+  const Matrix2<double> of_zero = zero.covariance + zero.sensitivity * now_.calibration.covariance *
+                                                        zero.sensitivity.transpose();
   record->localized = {*record->time_s - tied_time_s_,
                        std::sqrt(covariance.trace() / 2),
-                       {zero.value.x(), zero.value.y()}};
+                       {zero.value.x(), zero.value.y()},
+                       {of_zero(0, 0), of_zero(0, 1), of_zero(1, 1)}};
 }
 
 void OrientationStep::orient_by_scene(const ImageView& image, OrientationRecord* record) {

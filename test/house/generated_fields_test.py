@@ -16,8 +16,8 @@ TARGET_LIST = "edge_app/tracking/target_fields.yaml"
 AROUND_TARGETS_LIST = "edge_app/tracking/target_list_fields.yaml"
 OPENAPI = "edge_app/output/openapi.yaml"
 RECORD = "edge_app/record/orientation_record.h"
-# Members that no field shows: metrics and status have the first, scene map upkeep uses the second, the history has the third.
-NOT_SHOWN = {"clock_locked", "telemetry_zero", "telemetry_error"}
+# Members that no field shows: metrics and status have the first, localization uses the next two, the history has the last.
+NOT_SHOWN = {"clock_locked", "telemetry_zero", "zero_covariance", "telemetry_error"}
 # What is generated, and what a new field brings there.
 OF_RECORDS = {
     "edge_app/record/record_fields.h": 'line->add("sun_rad", record.sun_rad);',

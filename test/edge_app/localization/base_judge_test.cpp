@@ -53,6 +53,20 @@ Localization localized(const PanTilt<double>& angle, const Vector2<double>& zero
   return found;
 }
 
+// The same record in the map's base. zero, sigma: telemetry's zero there, and how well it is known.
+OrientationRecord tied(OrientationRecord record, const PanTilt<double>& zero, double sigma) {
+  record.localized = OrientationRecord::Localized{1, 1e-5, zero, {sigma * sigma, 0, sigma * sigma}};
+  return record;
+}
+
+// The same record while the link's delay is open.
+OrientationRecord vague(OrientationRecord record) {
+  constexpr double kSigma = 5e-3;
+  for (double& value : record.orientation->covariance_rad2)
+    value *= kSigma * kSigma / (kRecordSigma * kRecordSigma);
+  return record;
+}
+
 struct Judged {
   Verdict verdict;
   ToldBase told;
@@ -96,12 +110,46 @@ TEST(BaseJudge, AMovementTakesTwoPicturesThatSayTheSame) {
 TEST(BaseJudge, WhatIsTiedIsHeldAgainstWhatItClaims) {
   BaseJudge some;
   const PanTilt<double> angle{0.2, -0.1};
-  OrientationRecord record = record_at(angle);
-  record.localized = OrientationRecord::Localized{1, 1e-5, {5e-3, 0}};
+  const OrientationRecord record = tied(record_at(angle), {5e-3, 0}, 2e-3);
   const Judged out = judge(&some, record, localized(angle, {2e-4, 0}));
   EXPECT_EQ(out.verdict, Verdict::kExpected);
   EXPECT_NEAR(out.offset.zero.pan, 5.2e-3, 1e-9);
   EXPECT_EQ(judge(&some, record, localized(angle, {1e-3, 0})).verdict, Verdict::kSuspected);
+}
+
+// The first picture ties a vague record, which from then on agrees with the map, wherever the zero is.
+TEST(BaseJudge, AZeroThatWasTiedBeforeItWasKnownIsAMovementOnceItIsKnown) {
+  BaseJudge some;
+  const PanTilt<double> angle{0.2, -0.1};
+  const Localization found = localized(angle, {9e-3, 0});
+  EXPECT_EQ(judge(&some, vague(record_at(angle)), found).verdict, Verdict::kExpected);
+  const Localization agrees = localized(angle, {0, 0});
+  const auto later = [&](double zero, double sigma) {
+    return judge(&some, tied(record_at(angle), {zero, 0}, sigma), agrees);
+  };
+  EXPECT_EQ(later(9e-3, 5e-3).verdict, Verdict::kExpected) << "known no better than that";
+  EXPECT_EQ(later(9e-3, 2e-4).verdict, Verdict::kSuspected);
+  const Judged out = later(9.1e-3, 2e-4);
+  EXPECT_EQ(out.verdict, Verdict::kMoved);
+  EXPECT_NEAR(out.offset.zero.pan, 9.1e-3, 1e-9);
+  EXPECT_NEAR(std::sqrt(out.offset.covariance(0, 0)), std::hypot(2e-4, kRecordSigma, kMapSigma),
+              2e-6);
+  EXPECT_EQ(later(9.1e-3, 1e-4).verdict, Verdict::kExpected) << "told once";
+  // Untied again, as after a new calibration: still the same movement.
+  EXPECT_EQ(judge(&some, record_at(angle), found).verdict, Verdict::kExpected);
+}
+
+TEST(BaseJudge, AVagueRecordIsNotTiedAtOnceWhereMovementsAreOnlyReported) {
+  BaseJudge some({1e-3, false});
+  const PanTilt<double> angle{0.2, -0.1};
+  OrientationRecord record = vague(record_at(angle));
+  EXPECT_EQ(judge(&some, record, localized(angle, {9e-3, 0})).verdict, Verdict::kVague);
+  EXPECT_EQ(judge(&some, record_at(angle), localized(angle, {0, 0})).verdict, Verdict::kExpected);
+  EXPECT_EQ(judge(&some, record, localized(angle, {9e-3, 0})).verdict, Verdict::kVague);
+  *record.time_s += 59;
+  EXPECT_EQ(judge(&some, record, localized(angle, {9e-3, 0})).verdict, Verdict::kVague);
+  *record.time_s += 2;
+  EXPECT_EQ(judge(&some, record, localized(angle, {9e-3, 0})).verdict, Verdict::kExpected);
 }
 
 TEST(BaseJudge, IsToldToReportOnly) {
