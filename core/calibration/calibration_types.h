@@ -88,6 +88,10 @@ struct CalibrationOptions {
   std::optional<CalibrationPrior> clock_offset;  // s
   CalibrationPrior pan_scale = {1, 1e-8};
   CalibrationPrior tilt_scale = {1, 1e-8};
+  // Where the recording shows that pan and tilt differ in scale, by 2 % at most, both scales are
+  // learnt, each with the sigma that makes their difference likeliest. A larger difference is
+  // refused. False: the priors hold, as for a zoom curve, all of whose nodes need the same ones.
+  bool learns_scales = true;
   Vector3<double> pan_axis = Vector3<double>::UnitZ();   // base; normalised before use
   Vector3<double> tilt_axis = Vector3<double>::UnitY();  // likewise
   double axis_sigma_rad = 0.05;  // of both axes, each tangent component; 0: known exactly

@@ -76,6 +76,13 @@ MotionMatch match_motion(const std::vector<ImageMotion>& motion, const Trajector
     *angle = (1 - share) * grid[i] + share * grid[i + 1];
     return true;
   };
+  // How many motions begin during one of them.
+  double overlapping = 1;
+  if (motion.size() > 1) {
+    const double each_s =
+        (motion.back().from_s - motion.front().from_s) / static_cast<double>(motion.size() - 1);
+    overlapping = (motion.front().to_s - motion.front().from_s) / each_s;
+  }
   bool apart = true;
   const auto evaluate = [&](double shift) {
     MotionMatch match;
@@ -103,6 +110,14 @@ MotionMatch match_motion(const std::vector<ImageMotion>& motion, const Trajector
     };
     match.correlation = normalised(mp.sum(), mm.sum(), pp.sum());
     match.focal_length = pp.sum() > 0 ? mp.sum() / pp.sum() : 0;
+    for (int axis = 0; axis < 2; ++axis) {
+      if (!(pp[axis] > 0)) continue;
+      const double left = std::max(0.0, mm[axis] - mp[axis] * mp[axis] / pp[axis]);
+      // Motions overlap: those of one baseline count as one.
+      const double worth = static_cast<double>(used) / std::max(1.0, overlapping);
+      match.by_axis[static_cast<std::size_t>(axis)] = {mp[axis] / pp[axis],
+                                                       std::sqrt(left / (pp[axis] * worth))};
+    }
     return match;
   };
 

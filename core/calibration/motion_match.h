@@ -7,6 +7,7 @@
 // correlation need neither a guess of f nor clean tracks. Small tilt and nominal axes are assumed.
 // The result is good to some percent; the robust adjustment removes this error. Allocates.
 
+#include <array>
 #include <vector>
 
 #include "core/calibration/linearisation.h"
@@ -24,9 +25,16 @@ struct ImageMotion {
 // Neighbours in a chain share three landmarks or more.
 [[nodiscard]] std::vector<ImageMotion> image_motion(const AdjustmentData& data, double baseline_s);
 
-struct MotionMatch {
-  double shift_s = 0;       // telemetry time = image time + shift_s
+// By the motions about one axis alone. 0: it did not move.
+struct AxisMatch {
   double focal_length = 0;  // px
+  double sigma = 0;         // px, by what is left
+};
+
+struct MotionMatch {
+  double shift_s = 0;                // telemetry time = image time + shift_s
+  double focal_length = 0;           // px
+  std::array<AxisMatch, 2> by_axis;  // pan, tilt
   double correlation = 0;   // of the motions, 1 = perfect; 0: no match, shift and f mean nothing
   bool at_edge = false;     // the best shift is at an end of the range that was searched
   bool apart = false;       // at every shift fewer than half of the image's motions have telemetry

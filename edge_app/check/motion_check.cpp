@@ -89,6 +89,38 @@ void judge_scale(MotionReport* report, const MotionNeeds& needs) {
                                                  *report->focal_length_px)));
 }
 
+// The overlap of the motions halves their number.
+AxisFocalLength focal_length_by(const MotionFit& fit, std::size_t axis) {
+  const MotionSums& sums = fit.own[axis];
+  const double left = std::max(0.0, fit.mm[axis] - sums.explained()) /
+                      static_cast<double>(std::max<std::size_t>(fit.used, 1));
+  return {std::abs(sums.mp) / sums.pp, std::sqrt(2 * left / sums.pp)};
+}
+
+// Each axis by itself gives a focal length, and there is one: if they differ, angles of one axis
+// are told in another scale. calibrate() refuses a difference of 2 %; this check is good to some
+// percent.
+void judge_axes(MotionReport* report, const MotionNeeds& needs) {
+  constexpr double kMost = 0.04;
+  constexpr double kSigmas = 4;
+  if (!report->by_axis) return;
+  const auto& [pan, tilt] = *report->by_axis;
+  const double ratio = tilt.value_px / pan.value_px;
+  const double sigma =
+      ratio * std::hypot(pan.sigma_px / pan.value_px, tilt.sigma_px / tilt.value_px);
+  if (std::abs(ratio - 1) < std::max(kMost, kSigmas * sigma)) return;
+  const bool by_pan = ratio > 1;
+  add_problem(
+      &report->findings,
+      fmt::format(
+          "pan/tilt {}: pan and tilt differ in scale: by pan's angles the focal length is "
+          "{:.0f} px, by tilt's {:.0f} px; either {}'s angles are too large, by a factor of "
+          "{:.3f} +- {:.3f}, or {}'s too small; {}",
+          needs.source, pan.value_px, tilt.value_px, by_pan ? "pan" : "tilt",
+          by_pan ? ratio : 1 / ratio, by_pan ? sigma : sigma / (ratio * ratio),
+          by_pan ? "tilt" : "pan", needs.scales));
+}
+
 // The search's steps and the samples' age leave some 20 ms open. Three times that is another link's
 // delay.
 void judge_offset(MotionReport* report, const MotionNeeds& needs) {
@@ -199,8 +231,13 @@ MotionReport check_measured_motion(const std::vector<TimedShift>& shifts,
   if (pp > 0 && search.sure) {
     report.focal_length_px = mp / pp;
     report.clock_offset_s = search.offsets[best];
+    if (is_told(report.pan) && is_told(report.tilt)) {
+      report.by_axis = {focal_length_by(search.fits[best], 0),
+                        focal_length_by(search.fits[best], 1)};
+    }
   }
   judge_signs(&report, needs);
+  judge_axes(&report, needs);
   judge_scale(&report, needs);
   judge_offset(&report, needs);
   return report;

@@ -7,6 +7,7 @@
 // Reasons and the other rules: docs/derivations.md.
 // Good to some percent. Radians, seconds, px. Pure; allocates.
 
+#include <array>
 #include <optional>
 #include <string>
 #include <vector>
@@ -29,7 +30,9 @@ struct MotionNeeds {
   std::string reverse_pan;
   std::string reverse_tilt;
   std::string turn_image;  // by 180 degrees
-  std::string no_times;    // why the image's times cannot be used; empty: they can
+  // How the scale of an axis's angles is set: "pan_tilt.pan_range_deg and tilt_range_deg".
+  std::string scales;
+  std::string no_times;  // why the image's times cannot be used; empty: they can
 };
 
 enum class AxisVerdict {
@@ -40,6 +43,11 @@ enum class AxisVerdict {
   kNotJudged  // the image's times cannot be used
 };
 
+struct AxisFocalLength {
+  double value_px = 0;
+  double sigma_px = 0;
+};
+
 struct MotionReport {
   AxisVerdict pan = AxisVerdict::kNotMoved;
   AxisVerdict tilt = AxisVerdict::kNotMoved;
@@ -48,6 +56,8 @@ struct MotionReport {
   bool quarter_turn = false;  // pan moves the image vertically, tilt horizontally
   // px, from the axes whose sign is stated; set if the search is sure.
   std::optional<double> focal_length_px;
+  // px, from pan alone and from tilt alone, with sigmas; set if both signs are stated.
+  std::optional<std::array<AxisFocalLength, 2>> by_axis;
   std::optional<double> clock_offset_s;  // known to about 20 ms
   double explained = 0;                  // share of the image's motion
   std::string not_judged;                // why the image's times cannot be used

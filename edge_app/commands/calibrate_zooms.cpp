@@ -136,8 +136,7 @@ std::vector<Calibration> nodes_of(const ZoomCurve& curve) {
 }
 
 // What the tracks show while the zoom moves. calibration_of: each job's index in `calibrations`, if
-// it was calibrated.
-// Appends to *told what the report says of each of them.
+// it was calibrated. Appends to *told what the report says of each of them.
 std::vector<MovementObservation> observe_movements(
     const std::vector<CalibrationJob>& jobs,
     const std::vector<std::optional<std::size_t>>& calibration_of,
@@ -179,6 +178,7 @@ int calibrate_zooms(const CalibrateOptions& options, std::vector<CalibrationJob>
   for (std::size_t i = 0; i < jobs.size(); ++i) {
     CalibrationJob& job = jobs[i];
     const std::string name = fmt::format("{} at zoom {:g}", job.recording, *job.zoom);
+    job.options.learns_scales = false;
     CalibrationResult result = calibrate_job(options.passes, &job, signals);
     for (const std::string& remark : job.remarks) spdlog::warn("{}: {}", name, remark);
     std::string page;

@@ -51,6 +51,19 @@ std::string reverse_advice(const PanTiltConfig& pan_tilt, bool is_pan) {
       axis, other);
 }
 
+// How the scale of the angles is set, for this kind of device.
+std::string scale_advice(const PanTiltConfig& pan_tilt) {
+  switch (pan_tilt.type) {
+    case PanTiltConfig::Type::kOnvif:
+      return "correct pan_tilt.pan_range_deg and tilt_range_deg: the ends of what the device can "
+             "say";
+    case PanTiltConfig::Type::kRecording:
+      return "correct pan_rad and tilt_rad in telemetry.csv";
+    default:
+      return "correct the unit or the range of the angles in the device";
+  }
+}
+
 MotionReport motion_of(const Measured& measured, const VideoReport& video,
                        const TelemetryReport& telemetry, const Config& config,
                        const PublishedCalibration& calibration) {
@@ -76,6 +89,7 @@ MotionReport motion_of(const Measured& measured, const VideoReport& video,
       "if the camera hangs upside down, turn its picture by 180 degrees in its settings and set "
       "camera.upside_down: true; if not, for pan " +
       needs.reverse_pan + ", for tilt " + needs.reverse_tilt;
+  needs.scales = scale_advice(config.pan_tilt);
   needs.no_times = why_no_times(video.clock);
   return check_measured_motion(shifts, telemetry.fresh, needs);
 }

@@ -107,11 +107,16 @@ Json pan_tilt_json(const CheckReport& report) {
 
 Json motion_json(const std::optional<MotionReport>& motion) {
   if (!motion) return nullptr;
+  const auto by_axis = [&motion](std::size_t axis) {
+    return motion->by_axis ? Json((*motion->by_axis)[axis].value_px) : Json();
+  };
   return {{"pan_sign", name_of(motion->pan)},
           {"tilt_sign", name_of(motion->tilt)},
           {"image_moved", motion->image_moved},
           {"head_moved", motion->head_moved},
           {"focal_length_px", or_null(motion->focal_length_px)},
+          {"focal_length_by_pan_px", by_axis(0)},
+          {"focal_length_by_tilt_px", by_axis(1)},
           {"clock_offset_s", or_null(motion->clock_offset_s)}};
 }
 

@@ -89,10 +89,11 @@ bool SelfCalibration::judge_delay(const FrameTracks& tracks) {
   if (streams_.judge_delay(tracks)) {
     messages_.say(
         streams_.delay_wanders()
-            ? fmt::format("the video's delay, or its time stamps, wander by {:.0f} ms and more, "
-                          "as behind a relay: nothing is calibrated and nothing withdrawn until "
-                          "they hold; the camera itself would be better read directly",
-                          1e3 * tracks.delay_wander_s)
+            ? fmt::format("the video's delay, or its time stamps, wander by {:.0f} ms, more than "
+                          "the {:.0f} ms up to which a clock offset can be found: a relay, Wi-Fi, "
+                          "or a camera or machine that is too busy; nothing is calibrated and "
+                          "nothing withdrawn until they hold",
+                          1e3 * tracks.delay_wander_s, 1e3 * options_.schedule.most_wander_s)
             : "the video's delay holds again; the clock offset is found anew");
     if (streams_.delay_wanders()) widen_contradicted();
     begin_anew();
@@ -173,6 +174,7 @@ CheckedCalibration SelfCalibration::adjust(const Calibration* known, bool free_c
   options.width = options_.data_sheet.camera.width;
   options.height = options_.data_sheet.camera.height;
   options.adjustment = options_.adjustment;
+  options.adjustment.learns_scales = !free_centre && !makes_nodes();
   if (free_centre) {
     options.adjustment.centre_sigma_px = kUsualCentreShare * options.width;
   } else if (known == nullptr && is_calibrated_here() && !publication_.is_fresh_wanted()) {

@@ -576,6 +576,78 @@ TEST(Calibrate, NamesAnAxisThatHardlyMovesTheOtherWay) {
   }
 }
 
+// As with the wrong range of a head that tells -1 to 1. What fits best then is no camera.
+TEST(Calibrate, NamesAnAxisWhoseAnglesHaveAnotherScale) {
+  struct Scales {
+    double pan;
+    double tilt;
+    const char* large;
+  };
+  for (const Scales& scales :
+       {Scales{1.059, 1, "angles of pan are too large"},
+        Scales{1, 1.059, "angles of tilt are too large"},
+        Scales{1, 0.94, "angles of pan are too large"}, Scales{2, 1, "angles of pan are too large"},
+        Scales{0.7, 1, "angles of tilt are too large"}}) {
+    for (const double noise : {5e-5, 1e-3}) {
+      Simulation s = small_simulation(31);
+      s.pan_scale = scales.pan;
+      s.tilt_scale = scales.tilt;
+      s.pan_tilt_sigma = noise;
+      const CalibrationResult result = calibrate(simulate(s));
+      EXPECT_EQ(result.status, CalibrationStatus::kTelemetryMismatch) << result.message;
+      EXPECT_THAT(result.message, StartsWith("pan and tilt differ in scale"));
+      EXPECT_THAT(result.message, HasSubstr(scales.large));
+    }
+  }
+}
+
+// Which of both is right nobody can know: the focal length and the scales have that doubt, and nothing else has.
+TEST(Calibrate, ASmallDifferenceOfTheScalesIsInTheSigmas) {
+  for (const double tilt_scale : {0.985, 0.995, 0.9995, 1.001, 1.003, 1.005, 1.015}) {
+    Simulation s = small_simulation(31);
+    s.tilt_scale = tilt_scale;
+    const CalibrationResult result = calibrate(simulate(s));
+    SCOPED_TRACE(tilt_scale);
+    expect_within_sigmas(s, result);
+    const Calibration& found = result.calibration;
+    EXPECT_NEAR(found.mechanics.tilt_scale / found.mechanics.pan_scale, tilt_scale, 3e-4);
+    EXPECT_LT(parameter_sigma(found, Parameter::kRadialDistortion), 2e-3);
+    EXPECT_THAT(result.quality.advice,
+                ::testing::Contains(StartsWith("pan and tilt differ in scale")));
+  }
+}
+
+// There no perspective tells a common factor of scales and focal length, and the adjustment with both scales free does
+// not converge.
+TEST(Calibrate, ADifferenceOfTheScalesIsFoundInANarrowField) {
+  Simulation s = small_simulation(32);
+  s.focal_length = 10669.3;
+  s.width = 640;
+  s.height = 480;
+  s.image_rate_hz = 25;
+  s.duration_s = 15;
+  s.pixel_sigma = 0.1;
+  s.radial_distortion = 55.4;
+  s.tilt_scale = 0.992;
+  const CalibrationResult result = calibrate(simulate(s));
+  expect_within_sigmas(s, result);
+  const Calibration& found = result.calibration;
+  EXPECT_NEAR(found.mechanics.tilt_scale / found.mechanics.pan_scale, 0.992, 1e-3);
+  const double doubt = relative_focal_length_sigma(found) / std::abs(std::log(0.992));
+  EXPECT_GT(doubt, 0.45);
+  EXPECT_LT(doubt, 0.75);
+}
+
+TEST(Calibrate, TheScalesOfAZoomsNodeStayAsTold) {
+  Simulation s = small_simulation(31);
+  s.tilt_scale = 1.0005;
+  CalibrationOptions options;
+  options.learns_scales = false;
+  const CalibrationResult result = calibrate(simulate(s), options);
+  ASSERT_TRUE(result.ok()) << result.message;
+  EXPECT_NEAR(result.calibration.mechanics.tilt_scale, 1, 1e-6);
+}
+
 TEST(Calibrate, RefusesTooFewLandmarks) {
   CalibrationInput input = simulate(small_simulation(20));
   std::vector<CalibrationObservation> few;

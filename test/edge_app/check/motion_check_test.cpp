@@ -142,6 +142,34 @@ TEST(MotionCheck, SaysHowFarTheFocalLengthIsOff) {
   EXPECT_THAT(problems(scene.check().findings), ElementsAre(HasSubstr("Calibrate again")));
 }
 
+// As with a wrong range of a head that tells -1 to 1.
+TEST(MotionCheck, NamesAnAxisWhoseAnglesHaveAnotherScale) {
+  for (const double factor : {1.06, 0.9, 2.0}) {
+    for (const int axis : {0, 1}) {
+      Scene scene(wander, {1, 1}, 0.7);
+      scene.needs.scales = "SCALES";
+      for (PanTiltSample& sample : scene.samples) {
+        double& angle = axis == 0 ? sample.pan_rad : sample.tilt_rad;
+        angle *= factor;
+      }
+      const MotionReport report = scene.check();
+      ASSERT_TRUE(report.by_axis) << factor;
+      const auto& wrong = (*report.by_axis)[static_cast<std::size_t>(axis)];
+      EXPECT_NEAR(wrong.value_px, kFocalLength / factor, 0.01 * kFocalLength / factor);
+      const bool is_pan_large = (factor > 1) == (axis == 0);
+      EXPECT_THAT(problems(scene.check().findings),
+                  ::testing::Contains(
+                      AllOf(HasSubstr("pan and tilt differ in scale"), HasSubstr("SCALES"),
+                            HasSubstr(is_pan_large ? "either pan's angles are too large"
+                                                   : "either tilt's angles are too large"))))
+          << factor << " " << axis;
+    }
+  }
+  Scene alike(wander);
+  for (PanTiltSample& sample : alike.samples) sample.pan_rad *= 1.02;
+  EXPECT_THAT(alike.check().findings, IsEmpty());
+}
+
 TEST(MotionCheck, AdvisesWhereTheClockOffsetIsAnother) {
   Scene scene(wander);
   scene.needs.calibrated = true;
