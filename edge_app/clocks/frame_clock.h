@@ -37,6 +37,8 @@ struct FrameTime {
   // share this error.
   double off_line_s = 0;
   double wander_s = 0;  // s, the same if frames leave the line again and again, else 0
+  // Why clock.restarted, for people; of static storage. Empty: it is not restarted.
+  const char* restarted_by = "";
   // s, at a restart or step of the clock: how much the new line may differ from the old one. The
   // cause may be the delay or the stamps.
   double moved_s = 0;
@@ -102,6 +104,9 @@ class FrameClock {
     if (verdict == StampGuard::Verdict::kBad) return unusable(stamp);
     const bool begins = begins_ || kind != kind_ || verdict == StampGuard::Verdict::kJumped;
     const bool anew = begins && kind_ != Kind::kNew;
+    const char* const why = begins_         ? "a connection began"
+                            : kind != kind_ ? "its pictures carry other stamps than before"
+                                            : "its time stamps jumped";
     strange_ = 0;
     begins_ = false;
     if (begins) begin(kind);
@@ -113,8 +118,13 @@ class FrameClock {
     if (kind == Kind::kSenderTime && runs_off(stamp)) return leave_stamps_out(stamp);
     if (kind == Kind::kSenderTime) utc_.watch(stamp);
     FrameTime time = by_what_is_told(stamp);
-    time.clock.restarted = time.clock.restarted || (anew && kind != Kind::kNothing);
+    if (anew && kind != Kind::kNothing) restart(why, &time);
     return time;
+  }
+
+  static void restart(const char* why, FrameTime* time) {
+    time->clock.restarted = true;
+    time->restarted_by = why;
   }
 
   FrameTime by_what_is_told(const FrameStamp& stamp) {
@@ -136,7 +146,7 @@ class FrameClock {
     FrameStamp without = stamp;
     without.sender_time_s.reset();
     FrameTime time = by_what_is_told(without);
-    time.clock.restarted = true;
+    restart("its time stamps are left out", &time);
     time.stamp_rate_error = stamps_count_ ? count_.rate_error() : rate_.off();
     time.stamps_count = stamps_count_;
     return time;
@@ -224,7 +234,8 @@ class FrameClock {
       if (line_begins_) line_since_s_ = pace_.receive_s(i);
       line_begins_ = false;
     }
-    time.clock.restarted = backlog;  // the frames before it have other times
+    time.clock.restarted = false;
+    if (backlog) restart("pictures before had waited on their way", &time);
     time.known = !time.clock.rejected;
     waiting_ = false;
     return time;
@@ -239,14 +250,17 @@ class FrameClock {
     const double before_s = by_count ? 0
                                      : stamp.receive_time_s - filter.delay_shift_s() -
                                            filter.to_host(*stamp.sender_time_s);
-    if (young && before_s < -kEarly_s) return begin_again(stamp);
+    if (young && before_s < -kEarly_s)
+      return begin_again(stamp, "all pictures before had come late");
     const double shift_s = filter.delay_shift_s();
     time.clock = ask_clock(stamp, line_begins_);
     if (line_begins_) line_since_s_ = stamp.receive_time_s;
     line_begins_ = false;
     time.known = !time.clock.rejected;
     if (time.clock.rejected) return time;
-    if (time.clock.restarted && !by_count) return begin_again(stamp);
+    if (time.clock.restarted && !by_count)
+      return begin_again(stamp, "its pictures stay off the line of its time stamps");
+    if (time.clock.restarted) time.restarted_by = "its count of pictures does not go on";
     if (by_count && goes_astray(stamp, &time)) return time;
     if (time.clock.delay_stepped) time.moved_s = std::abs(filter.delay_shift_s() - shift_s);
     judge_lateness(stamp, &time);
@@ -261,7 +275,7 @@ class FrameClock {
       return false;
     }
     if (++strays_ == kManyStrays) {
-      *time = begin_again(stamp);
+      *time = begin_again(stamp, "the driver's stamps contradict the count of pictures");
       return true;
     }
     time->clock.time_s = stamp.receive_time_s;
@@ -271,12 +285,12 @@ class FrameClock {
   }
 
   // All that the stream has shown so far belonged to a backlog, or to another clock.
-  FrameTime begin_again(const FrameStamp& stamp) {
+  FrameTime begin_again(const FrameStamp& stamp, const char* why) {
     begin(kind_);
     utc_.forget();
     FrameTime time = waiting_ ? wait(stamp) : FrameTime{ask_clock(stamp, true)};
     line_begins_ = waiting_;
-    time.clock.restarted = true;
+    restart(why, &time);
     time.moved_s = wander_.off_s();
     return time;
   }
@@ -297,7 +311,8 @@ class FrameClock {
     if (runs_on_) return;
     time->known = false;
     pace_.add(stamp.receive_time_s, time->clock.time_s);
-    if (pace_.shown(kStoodStill_s)) *time = begin_again(stamp);
+    if (pace_.shown(kStoodStill_s))
+      *time = begin_again(stamp, "late pictures come at an even pace: the delay is another");
   }
 
   // A backlog arrives at once and is worked off. Until then it shows nothing about the delay. If

@@ -72,6 +72,7 @@ void write_configuration(const CameraFindings& findings, CameraSetupOptions setu
             .value_or("");
   }
   const CameraSetupResult result = set_up_camera(findings, setup);
+  if (setup.try_links) spdlog::info("tried: a picture and an angle came");
   for (const std::string& remark : result.remarks) spdlog::info("{}", remark);
   if (!result.password_file.empty())
     spdlog::info("{}: the password, for its owner only (mode 600)", result.password_file);

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <string>
 
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/live_calibration.h"
@@ -111,17 +112,26 @@ std::unique_ptr<MqttPublisher> make_mqtt(const Config& config, LiveTargets* targ
   return mqtt;
 }
 
-// Waits for a signal, the end of the pipeline or the end of the duration.
-void wait_for_the_end(StopSignals* signals, const Pipeline& pipeline, LifeReport* report,
-                      double duration_s) {
+// Waits for a signal, the end of the pipeline or the end of the duration. Gives back which it was,
+// for people.
+std::string wait_for_the_end(StopSignals* signals, const Pipeline& pipeline, LifeReport* report,
+                             double duration_s) {
   const double end_s = monotonic_now_s() + duration_s;
   double left_s = duration_s;
   while (left_s > 0) {
     const double wait_s = std::min(left_s, report->period_s());
-    if (signals->wait(pipeline.finished_fd(), wait_s) != StopSignals::Event::kTimeout) return;
+    switch (signals->wait(pipeline.finished_fd(), wait_s)) {
+      case StopSignals::Event::kSignal:
+        return signals->seen();
+      case StopSignals::Event::kDescriptor:
+        return "the sources have ended";
+      case StopSignals::Event::kTimeout:
+        break;
+    }
     report->tell();
     left_s = end_s - monotonic_now_s();
   }
+  return "the duration is over";
 }
 
 }  // namespace
@@ -219,7 +229,8 @@ int run_live(const RunOptions& options) {
   const ServiceManager manager;
   manager.ready();
   LifeReport report(manager, &pipeline);
-  wait_for_the_end(&signals, pipeline, &report, options.duration_s);
+  const std::string end = wait_for_the_end(&signals, pipeline, &report, options.duration_s);
+  spdlog::info("run ends: {}", end);
   manager.stopping();
   if (http) http->stop();
   if (targets) targets->stop();

@@ -43,6 +43,7 @@ StopSignals::Event StopSignals::wait(int descriptor, double timeout_s) {
         throw std::system_error(errno, std::generic_category(), "signalfd");
       }
       pthread_sigmask(SIG_UNBLOCK, &signals_, nullptr);
+      seen_ = information.ssi_signo == SIGINT ? "SIGINT" : "SIGTERM";
       return Event::kSignal;
     }
     if (ready > 0) return Event::kDescriptor;

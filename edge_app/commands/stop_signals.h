@@ -19,10 +19,13 @@ class StopSignals {
   // (infinity: for ever; 0 or less: only looks). Like the constructor, throws std::system_error if
   // the system refuses.
   Event wait(int descriptor, double timeout_s);
+  // "SIGINT" or "SIGTERM": the one that wait() has seen; empty: none.
+  [[nodiscard]] const char* seen() const { return seen_; }
 
  private:
   sigset_t signals_{};
   int descriptor_ = -1;  // signalfd
+  const char* seen_ = "";
 };
 
 }  // namespace alidade

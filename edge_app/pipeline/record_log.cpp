@@ -57,7 +57,8 @@ void RecordLog::log_clock(const OutputMessage& message) {
                : "a camera that counts its stamps at a rate it does not keep may be set to that "
                  "rate");
   } else if (events.video_clock_restarted) {
-    spdlog::info("{}: clock filter restarted at frame {}", video_.name(), *message.record.frame);
+    spdlog::info("{}: clock filter restarted at frame {}: {}", video_.name(), *message.record.frame,
+                 events.video_clock_restarted_by);
   }
   if (events.video_delay_stepped) {
     spdlog::warn(
@@ -75,7 +76,8 @@ void RecordLog::log_clock(const OutputMessage& message) {
   if (events.video_delay_wander_s == 0 || !wander_.is_due()) return;
   spdlog::warn(
       "{}: time stamps and arrivals of its pictures wander against each other, by {:.0f} ms at "
-      "frame {}: a picture's time is known to that only; is a relay in between?",
+      "frame {}: a picture's time is known to that only; is a relay or Wi-Fi in between, or is the "
+      "camera or this machine too busy?",
       video_.name(), 1e3 * events.video_delay_wander_s, *message.record.frame);
 }
 

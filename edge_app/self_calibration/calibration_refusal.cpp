@@ -92,9 +92,11 @@ CalibrationRefusal why_refused(const CheckedCalibration& checked, std::size_t fr
   const std::string why = fmt::format(" ({}): {}", to_string(result.status), checked.refusal);
   const double taken_up = share_taken_up(result, frames);
   if (taken_up >= kFewPictures || !pictures_would_help(result)) return {need_of(checked), why};
-  const std::string few =
-      fmt::format("only {:.0f} % of the pictures came here: is the machine too slow, or too busy?",
-                  100 * taken_up);
+  const std::string few = fmt::format(
+      "only {:.0f} % of the pictures came here, as the camera's time stamps or count "
+      "have it: is the machine too slow or too busy, or does the camera leave out "
+      "pictures?",
+      100 * taken_up);
   return {CalibrationNeed::kPictures,
           result.status == CalibrationStatus::kTelemetryMismatch ? ": " + few : why + "; " + few};
 }

@@ -52,7 +52,7 @@ std::string telemetry_text(const FoundCamera& camera) {
                                                : "not known";
   }
   if (!trial.asked) return trial.type + ", not asked: it wants a login";
-  if (!trial.error.empty()) return trial.type + ", no answer: " + trial.error;
+  if (!trial.error.empty()) return trial.type + ", no angles: " + trial.error;
   return fmt::format("{} answers: pan {:.2f} deg, tilt {:.2f} deg", trial.type, trial.pan_deg,
                      trial.tilt_deg) +
          (trial.zoom ? fmt::format(", zoom {:g}", *trial.zoom) : std::string());

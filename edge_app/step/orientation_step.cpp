@@ -157,6 +157,7 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
   const FrameTime frame_time = video_clock_.update(stamp);
   const ClockEstimate& clock = frame_time.clock;
   events->video_clock_restarted = clock.restarted;
+  events->video_clock_restarted_by = frame_time.restarted_by;
   events->video_delay_stepped = clock.delay_stepped;
   events->video_moved_s = frame_time.moved_s;
   events->video_delay_wander_s = frame_time.wander_s;

@@ -86,8 +86,9 @@ struct LinkDelayReport {
 // What a frame brought to light, for the log.
 struct StepEvents {
   bool video_clock_restarted = false;
-  bool video_delay_stepped = false;  // or the sender's clock did; flagged, not followed
-  double video_moved_s = 0;          // by how much, at such a step or a restart
+  const char* video_clock_restarted_by = "";  // why, for people; of static storage
+  bool video_delay_stepped = false;           // or the sender's clock did; flagged, not followed
+  double video_moved_s = 0;                   // by how much, at such a step or a restart
   // From this frame on images exclude the focal length of the zoom reading.
   bool zoom_contradicted = false;
   double video_delay_wander_s = 0;  // s, by how much the delay wanders; 0: it does not

@@ -56,7 +56,7 @@ export const kNeeds = {
   'more of the same motion': 'Please go on moving the camera like this.',
   'a steady zoom': 'Please leave the zoom alone.',
   'video whose delay does not wander':
-    'The delay of the video wanders, as behind a relay: please read the camera itself.',
+    'The delay of the video wanders, as behind a relay or Wi-Fi, or where the camera or this machine is too busy: please read the camera itself, by cable.',
   'younger telemetry, or a larger realtime.max_extrapolation_s':
     'Most pictures lie too far beyond the newest trusted pan/tilt angle: see `alidade check`; pan_tilt.rate_hz, pan_tilt.max_repeat_s or realtime.max_extrapolation_s.',
 };
