@@ -43,14 +43,13 @@ BaseJudge::Verdict BaseJudge::judge(const OrientationRecord& record, const Local
   Matrix2<double> of_before = Matrix2<double>::Zero();
   if (record.localized) {
     before = record.localized->telemetry_zero;
-    const auto& packed = record.localized->zero_covariance;
-    of_before << packed[0], packed[1], packed[1], packed[2];
+    of_before = unpack_symmetric(record.localized->zero_covariance);
   }
   offset->covariance = of_change + of_before;
   offset->zero = {before.pan + change.x(), before.tilt + change.y()};
   offset->roll = log_so3<double>(R_by_angles.transpose() * R_localized).z();
   told->change_rad = {change.x(), change.y()};
-  told->covariance = {of_map(0, 0), of_map(0, 1), of_map(1, 1)};
+  told->covariance = pack_symmetric(of_map);
   told->moved = false;
 
   Matrix2<double> of_zero = offset->covariance + told_.covariance;

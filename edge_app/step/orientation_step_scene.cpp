@@ -63,7 +63,7 @@ void OrientationStep::note_tie(OrientationRecord* record) const {
   record->localized = {*record->time_s - tied_time_s_,
                        std::sqrt(covariance.trace() / 2),
                        {zero.value.x(), zero.value.y()},
-                       {of_zero(0, 0), of_zero(0, 1), of_zero(1, 1)}};
+                       pack_symmetric(of_zero)};
 }
 
 void OrientationStep::orient_by_scene(const ImageView& image, OrientationRecord* record) {

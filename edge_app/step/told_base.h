@@ -38,10 +38,20 @@ static_assert(std::is_trivially_copyable_v<ToldBase>);
   return out;
 }
 
+// A covariance of (pan, tilt): pan, pan with tilt, tilt.
+[[nodiscard]] inline std::array<double, 3> pack_symmetric(const Matrix2<double>& m) {
+  return {m(0, 0), m(0, 1), m(1, 1)};
+}
+[[nodiscard]] inline Matrix2<double> unpack_symmetric(const std::array<double, 3>& m) {
+  Matrix2<double> out;
+  out << m[0], m[1], m[1], m[2];
+  return out;
+}
+
 [[nodiscard]] inline BaseMeasurement unpack(const ToldBase& told) {
   BaseMeasurement out;
   out.change = {told.change_rad[0], told.change_rad[1]};
-  out.covariance << told.covariance[0], told.covariance[1], told.covariance[1], told.covariance[2];
+  out.covariance = unpack_symmetric(told.covariance);
   out.moved = told.moved;
   return out;
 }
