@@ -190,12 +190,16 @@ ReadStatus RtpPorts::receive(double deadline_s, std::uint8_t* data, std::size_t 
                              ReceivedPacket* packet, std::string* error) {
   auto& [media, reports] = sockets_;
   while (!interrupted_) {
-    ReadStatus status = take(&media, data, capacity, packet, error);
-    if (status == ReadStatus::kOk) {
-      const std::optional<RtpHeader> header = parse_rtp_header(data, packet->size);
-      amid_picture_ = header && !header->marker;
-    } else if (status == ReadStatus::kTimeout) {
-      status = take(&reports, data, capacity, packet, error);
+    // Between pictures a report goes first: behind pictures that wait it would come too late for all
+    // of them, which have their UTC by it.
+    ReadStatus status =
+        amid_picture_ ? ReadStatus::kTimeout : take(&reports, data, capacity, packet, error);
+    if (status == ReadStatus::kTimeout) {
+      status = take(&media, data, capacity, packet, error);
+      if (status == ReadStatus::kOk) {
+        const std::optional<RtpHeader> header = parse_rtp_header(data, packet->size);
+        amid_picture_ = header && !header->marker;
+      }
     }
     if (status != ReadStatus::kTimeout) return status;
     const double left_s = deadline_s - monotonic_now_s();
