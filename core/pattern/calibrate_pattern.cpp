@@ -263,8 +263,8 @@ PatternCalibration calibrate_pattern(const PatternData& as_detected,
     }
     sigma_px = leave_out_wrong(data, state, &used);
     if (result.rounds == 0) expect_accelerations(state.curve, &adjustment);
-    score_options.sigma_px =
-        internal::observation_noise(data, used, state, result.frame_interval_s);
+    const double noise_px = internal::observation_noise(data, used, state, result.frame_interval_s);
+    score_options.sigma_px = noise_px > 0 ? noise_px : sigma_px;
     score = internal::score_knots(data, used, state, score_options);
     const bool is_followed = score.gain < kFollowed * score.expected || score.split.empty();
     if (result.rounds == kMaxRounds) break;

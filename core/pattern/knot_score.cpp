@@ -180,7 +180,9 @@ double observation_noise(const PatternData& data, const PatternMask& used,
   double sum = 0;
   for (std::size_t i = 0; i < all.size(); ++i) sum += all[i].r.squaredNorm() - step.gain[i];
   const double freedom = 2 * static_cast<double>(all.size()) - step.unknowns;
-  return freedom > 0 ? std::sqrt(sum / freedom) : 0;
+  if (!(freedom > 0)) return 0;
+  constexpr double kLeast = 1e-6;  // px; of points without noise the sum is what rounding leaves
+  return std::sqrt(std::max(kLeast * kLeast, sum / freedom));
 }
 
 }  // namespace alidade::internal

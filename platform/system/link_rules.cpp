@@ -48,8 +48,7 @@ Redirection judge_redirection(const Url& configured, const std::string& asked,
   Url url;
   std::string ignored;
   const bool is_url = parse_url(resolved_url(asked, told), &url, &ignored);
-  const std::string what =
-      "redirected to " + shown_url(is_url ? url.bare : told.substr(told.rfind('@') + 1));
+  const std::string what = "redirected to " + shown_url(is_url ? url.bare : told);
   if (!is_url || url.host.empty() || without_tls(url.scheme) != without_tls(configured.scheme)) {
     result.error = what + ", which is no address of this kind: refused";
     return result;

@@ -92,18 +92,23 @@ bool parse_url(const std::string& text, Url* url, std::string* error) {
 
 std::string without_secrets(std::string_view url) {
   std::string result;
+  bool in_query = false;  // there / and ? are parts of a value
   while (true) {
-    const std::size_t end = url.find_first_of("?&;/#");
+    const std::size_t end = url.find_first_of(in_query ? "&;#" : "?&;/#");
     result += piece_without_secrets(url.substr(0, end));
     if (end == std::string_view::npos) return result;
     result += url[end];
+    in_query = url[end] != '#' && (in_query || url[end] == '?');
     url.remove_prefix(end + 1);
   }
 }
 
-std::string shown_url(std::string_view url) {
+std::string shown_url(const std::string& text) {
   constexpr std::size_t kMost = 120;  // bytes
-  return shown(without_secrets(url), kMost);
+  Url url;
+  std::string error;
+  static_cast<void>(parse_url(text, &url, &error));
+  return shown(url.shown, kMost);
 }
 
 bool is_by_tls(std::string_view url_or_scheme) {

@@ -23,11 +23,11 @@ struct Url {
 [[nodiscard]] bool parse_url(const std::string& text, Url* url, std::string* error);
 
 // "***" in place of each value whose key sounds like a secret (password, pwd, token, user ...):
-// srt://h:1?passphrase=***. A value ends at the next of ? & ; / #.
+// srt://h:1?passphrase=***. A value ends at the next of & ; #, before the query also at / and ?.
 [[nodiscard]] std::string without_secrets(std::string_view url);
 
-// A foreign address for messages: without_secrets(), then its first 120 bytes, escaped.
-[[nodiscard]] std::string shown_url(std::string_view url);
+// A foreign address for messages: the first 120 bytes of Url::shown, escaped. text may be no URL.
+[[nodiscard]] std::string shown_url(const std::string& text);
 
 // True if the text is a URL over TLS, or the scheme of one: https, rtsps, mqtts.
 [[nodiscard]] bool is_by_tls(std::string_view url_or_scheme);

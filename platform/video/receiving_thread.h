@@ -64,11 +64,15 @@ class ReceivingThread {
   void refuse(std::string reason) {
     {
       const std::lock_guard<std::mutex> lock(mutex_);
-      refused_ = true;
-      refusal_ = std::move(reason);
       distrusted_ = true;
       accepted_ = false;
-      clear();
+      if (connected_) {
+        refused_ = true;
+        refusal_ = std::move(reason);
+        clear();
+      } else {
+        report_in_place_of_all(std::move(reason));
+      }
     }
     interrupt_();
   }
@@ -170,6 +174,15 @@ class ReceivingThread {
     bytes_ = 0;
   }
 
+  // The connection that brought what is refused has ended by itself. That it failed for good stays.
+  void report_in_place_of_all(std::string reason) {
+    Event report{ReadStatus::kDisconnected, std::move(reason), Picture{}, 0};
+    if (!queue_.empty() && queue_.back().status == ReadStatus::kFailed)
+      report = std::move(queue_.back());
+    clear();
+    queue_.push_back(std::move(report));
+  }
+
   void drop_oldest() {
     const auto is_picture = [](const Event& event) { return event.status == ReadStatus::kOk; };
     const Position after = remove(std::find_if(queue_.begin(), queue_.end(), is_picture));
@@ -184,10 +197,12 @@ class ReceivingThread {
       {
         const std::lock_guard<std::mutex> lock(mutex_);
         refused_ = false;
+        connected_ = true;
       }
       Event event{ReadStatus::kStopped, "", Picture{}, 0};
       event.status = connection_(&event.error);
       std::unique_lock<std::mutex> lock(mutex_);
+      connected_ = false;
       if (stopped_) {
         return;
       }
@@ -220,6 +235,7 @@ class ReceivingThread {
   bool accepted_ = false;             // guarded by mutex_; the last picture was taken and not
                                       // refused so far
   bool distrusted_ = false;           // guarded by mutex_; nothing was accepted since a refusal
+  bool connected_ = false;            // guarded by mutex_; connection_ runs
   std::string refusal_;               // guarded by mutex_
   std::atomic<bool> refused_{false};  // set under mutex_; the current connection was refused
   std::atomic<bool> stopped_{false};  // set under mutex_, read anywhere

@@ -14,6 +14,7 @@ constexpr std::size_t kLargestPacket = 65'535;
 constexpr std::size_t kLeastPacket = 8;     // RTCP's shortest
 constexpr unsigned kMostChannels = 32;      // channels that were not agreed on
 constexpr std::size_t kMaxHead = 16 << 10;  // bytes of a message's first line and headers
+constexpr std::size_t kMaxHeadInGarbage = 2 << 10;
 
 // Possible starts of a camera's message.
 constexpr std::array<std::string_view, 12> kBeginnings = {
@@ -85,8 +86,10 @@ RtspFraming::Extent RtspFraming::message_at(std::string_view bytes) const {
     return bytes.substr(0, common) == beginning.substr(0, common);
   });
   if (!begins) return {Guess::kNot};
+  // Within garbage a message may seem to begin every few bytes.
+  const std::size_t most_head = garbage_in_a_row_ > 0 ? kMaxHeadInGarbage : kMaxHead;
   std::size_t line = 0;  // start of the current line
-  for (std::size_t at = 0; at < std::min(bytes.size(), kMaxHead); ++at) {
+  for (std::size_t at = 0; at < std::min(bytes.size(), most_head); ++at) {
     if (bytes[at] == '\n') {
       const bool empty = at == line || (at == line + 1 && bytes[line] == '\r');
       if (empty) {
@@ -103,7 +106,7 @@ RtspFraming::Extent RtspFraming::message_at(std::string_view bytes) const {
       return {Guess::kNot};
     }
   }
-  return {bytes.size() < kMaxHead ? Guess::kMayBecome : Guess::kTooLong};
+  return {bytes.size() < most_head ? Guess::kMayBecome : Guess::kTooLong};
 }
 
 RtspFraming::Item RtspFraming::next() {

@@ -36,6 +36,8 @@ TEST(Url, ShowsNoSecretOfAQuery) {
       {"http://h/x?API-Key=hidden;size=4", "?API-Key=***;size=4"},
       {"http://h/x?access_token=hidden=hidden", "?access_token=***"},
       {"http://h/x?p%61ss=hidden", "?p%61ss=***"},
+      {"http://h/x?token=ab/hidden&size=4", "?token=***&size=4"},
+      {"http://h/x?token=ab?hidden#y/z", "?token=***#y/z"},
       {"http://h/x?pw=hidden&size=640x480", "?pw=***&size=640x480"}};
   for (const auto& [text, seen] : cases) {
     Url url;
@@ -51,6 +53,10 @@ TEST(Url, ShowsNoSecretOfAQuery) {
   EXPECT_EQ(url.shown, url.bare);
   EXPECT_FALSE(parse_url("a@h/x?pwd=hidden", &url, &error));
   EXPECT_THAT(url.shown + url.bare + error, Not(HasSubstr("hidden")));
+  EXPECT_THAT(shown_url("rtsp://admin:hid@den@h/x"),
+              AllOf(HasSubstr("rtsp://"), Not(HasSubstr("hid"))));
+  EXPECT_THAT(shown_url("http://admin:hidden@h/x"), HasSubstr("http://h/x"));
+  EXPECT_EQ(shown_url("/onvif/ptz"), "/onvif/ptz");
 }
 
 TEST(Url, ShowsNoPasswordOfAUrlItCannotParse) {
