@@ -254,7 +254,7 @@ Verification verify(const VerifyInput& input) {
   if (is_enough) out.verdict = Verdict::kHolds;
   for (ModelComparison& comparison : out.model) {
     if (!is_enough) comparison.verdict = Verdict::kNotJudged;
-    comparison.sentence = sentence_of(comparison);
+    comparison.sentence = sentence_of(comparison, out.found);
     if (comparison.verdict == Verdict::kContradicted) out.verdict = Verdict::kContradicted;
   }
   for (const ClaimComparison& comparison : out.claims) {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "core/model/angle.h"
 #include "core/model/recording_needs.h"
@@ -17,6 +18,17 @@ double largest_sigmas(const DepartureTest& test) {
     if (test.sigma[i] > 0) out = std::max(out, std::abs(test.size[i]) / test.sigma[i]);
   }
   return out;
+}
+
+// The sizes at those knots of a curve that are known to within some times the best one; not empty.
+std::vector<double> well_known(const DepartureTest& test) {
+  constexpr double kWorse = 30;
+  const double best = *std::min_element(test.sigma.begin(), test.sigma.end());
+  std::vector<double> out;
+  for (std::size_t i = 0; i < test.size.size(); ++i) {
+    if (test.sigma[i] <= kWorse * best) out.push_back(test.size[i]);
+  }
+  return out.empty() ? test.size : out;
 }
 
 // The comparison with what is known from outside that decides; null: none.
@@ -63,6 +75,21 @@ const ClaimComparison* worst_claim(const Verification& verification) {
     if (is_worse) worst = &each;
   }
   return worst;
+}
+
+bool is_among(const std::vector<DepartureTest>& found, Departure departure) {
+  return std::any_of(found.begin(), found.end(), [departure](const DepartureTest& test) {
+    return test.departure == departure;
+  });
+}
+
+std::string names_of(const std::vector<DepartureTest>& found) {
+  std::string out;
+  for (const DepartureTest& test : found) {
+    out += out.empty() ? "" : &test == &found.back() ? " and " : ", ";
+    out += name_of(test.departure);
+  }
+  return out;
 }
 
 }  // namespace
@@ -146,12 +173,13 @@ std::string size_of(const DepartureTest& test) {
                        unit * test.sigma.front(), name);
   };
   const auto curve = [&test](double unit, const char* name) {
-    // What all knots have in common is no error.
-    double mean = 0;
-    for (const double size : test.size) mean += size / static_cast<double>(test.size.size());
+    // What all knots have in common is no error. A knot that the recording does not show has a
+    // sigma without end, and any size.
+    const std::vector<double> shown = well_known(test);
+    const auto n = static_cast<double>(shown.size());
+    const double mean = std::accumulate(shown.begin(), shown.end(), 0.0) / n;
     double square = 0;
-    for (const double size : test.size) square += (size - mean) * (size - mean);
-    const auto n = static_cast<double>(test.size.size());
+    for (const double size : shown) square += (size - mean) * (size - mean);
     return fmt::format("RMS {:.3g}{}, {:.1f} sigmas at most", unit * std::sqrt(square / n), name,
                        largest_sigmas(test));
   };
@@ -208,7 +236,8 @@ std::string sentence_of(const ClaimComparison& comparison) {
       comparison.verdict == Verdict::kContradicted ? ", more than chance" : "");
 }
 
-std::string sentence_of(const ModelComparison& comparison) {
+std::string sentence_of(const ModelComparison& comparison,
+                        const std::vector<DepartureTest>& found) {
   const DepartureTest& test = comparison.test;
   const char* name = name_of(test.departure);
   switch (comparison.verdict) {
@@ -217,7 +246,10 @@ std::string sentence_of(const ModelComparison& comparison) {
     case Verdict::kHolds:
       return fmt::format("{}: as calibrated; by this recording alone {}", name, size_of(test));
     case Verdict::kContradicted:
-      return fmt::format("{}: contradicted; by this recording alone {}", name, size_of(test));
+      if (found.empty() || is_among(found, test.departure))
+        return fmt::format("{}: contradicted; by this recording alone {}", name, size_of(test));
+      return fmt::format("{}: {} if nothing else were wrong; explained by {}", name, size_of(test),
+                         names_of(found));
   }
   return name;
 }

@@ -3,6 +3,7 @@
 // the whole. Pure; allocates.
 
 #include <string>
+#include <vector>
 
 #include "edge_app/verify/verification.h"
 
@@ -19,7 +20,10 @@ namespace alidade {
 // "OE" or "PT".
 [[nodiscard]] const char* mode_of(OrientationFrom from);
 [[nodiscard]] std::string sentence_of(const ClaimComparison& comparison);
-[[nodiscard]] std::string sentence_of(const ModelComparison& comparison);
+// found: ModelCheckResult::found. One error makes many departures improbable: those that are not
+// among the found ones are said to be explained by them.
+[[nodiscard]] std::string sentence_of(const ModelComparison& comparison,
+                                      const std::vector<DepartureTest>& found);
 [[nodiscard]] std::string sentence_of(const KnownComparison& comparison);
 // The verdict, with the number that matters and the likeliest causes.
 [[nodiscard]] std::string summary_of(const Verification& verification);

@@ -52,6 +52,36 @@ TEST(Verification, HasJsonAndAPageWithEscapedNames) {
   EXPECT_THAT(page, Not(HasSubstr("<nothing>")));
 }
 
+// One error makes several departures improbable.
+TEST(Verification, SaysOfADepartureThatIsNoCauseWhatExplainsIt) {
+  const auto comparison_of = [](Departure departure) {
+    ModelComparison out;
+    out.verdict = Verdict::kContradicted;
+    out.test.departure = departure;
+    out.test.size = {2e-3};
+    out.test.sigma = {1e-4};
+    return out;
+  };
+  const ModelComparison offset = comparison_of(Departure::kClockOffset);
+  const ModelComparison play = comparison_of(Departure::kPanPlay);
+  EXPECT_EQ(sentence_of(offset, {}),
+            "clock offset: contradicted; by this recording alone off by 2 +- 0.1 ms");
+  EXPECT_EQ(sentence_of(offset, {offset.test}), sentence_of(offset, {}));
+  EXPECT_EQ(sentence_of(play, {offset.test}),
+            "play of pan: 2 +- 0.1 mrad if nothing else were wrong; explained by clock offset");
+  EXPECT_EQ(sentence_of(play, {offset.test, comparison_of(Departure::kLineDelay).test}),
+            "play of pan: 2 +- 0.1 mrad if nothing else were wrong; explained by clock offset and "
+            "line delay");
+}
+
+TEST(Verification, TheSizeOfACurveIsThatOfTheKnotsThatAreShown) {
+  DepartureTest test;
+  test.departure = Departure::kPanDrift;
+  test.size = {1e-3, -1e-3, 1e11, 1e-3, -1e-3};
+  test.sigma = {1e-4, 1e-4, 1e11, 1e-4, 1e-4};
+  EXPECT_EQ(size_of(test), "RMS 1 mrad, 10.0 sigmas at most");
+}
+
 TEST(Verification, NamesAllDeparturesAndReturns) {
   for (int i = 0; i < kDepartureCount; ++i)
     EXPECT_STRNE(name_of(static_cast<Departure>(i)), "unknown") << i;
