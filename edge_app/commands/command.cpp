@@ -206,19 +206,18 @@ std::int64_t most_pixels(const VideoConfig& config) {
 
 // The options that all live sources share.
 template <class Options>
-Options live_options(const VideoConfig& config, bool decode, const std::string& copy_to) {
+Options live_options(const VideoConfig& config, bool decode) {
   Options options;
   options.decode = decode;
   options.timeout_s = config.timeout_s;
   options.max_backoff_s = config.max_backoff_s;
-  options.copy_to = copy_to;
   return options;
 }
 
 // Those that sources behind a URL share.
 template <class Options>
-Options streamed_options(const VideoConfig& config, bool decode, const std::string& copy_to) {
-  auto options = live_options<Options>(config, decode, copy_to);
+Options streamed_options(const VideoConfig& config, bool decode) {
+  auto options = live_options<Options>(config, decode);
   options.url = config.url;
   options.user = config.user;
   options.password = config.password;
@@ -227,8 +226,8 @@ Options streamed_options(const VideoConfig& config, bool decode, const std::stri
   return options;
 }
 
-RtpSourceOptions rtp_options(const VideoConfig& config, bool decode, const std::string& copy_to) {
-  auto options = streamed_options<RtpSourceOptions>(config, decode, copy_to);
+RtpSourceOptions rtp_options(const VideoConfig& config, bool decode) {
+  auto options = streamed_options<RtpSourceOptions>(config, decode);
   options.format = config.format;
   options.transport = config.transport == VideoConfig::Transport::kUdp
                           ? RtpSourceOptions::Transport::kUdp
@@ -237,8 +236,8 @@ RtpSourceOptions rtp_options(const VideoConfig& config, bool decode, const std::
   return options;
 }
 
-V4l2SourceOptions v4l2_options(const VideoConfig& config, bool decode, const std::string& copy_to) {
-  auto options = live_options<V4l2SourceOptions>(config, decode, copy_to);
+V4l2SourceOptions v4l2_options(const VideoConfig& config, bool decode) {
+  auto options = live_options<V4l2SourceOptions>(config, decode);
   options.device = config.device;
   options.wish = {config.pixel_format, config.width, config.height, config.rate_hz};
   return options;
@@ -246,16 +245,15 @@ V4l2SourceOptions v4l2_options(const VideoConfig& config, bool decode, const std
 
 }  // namespace
 
-std::unique_ptr<FrameSource> make_frame_source(const VideoConfig& config, bool decode,
-                                               const std::string& copy_to) {
+std::unique_ptr<FrameSource> make_frame_source(const VideoConfig& config, bool decode) {
   switch (config.type) {
     case VideoConfig::Type::kRtsp:
     case VideoConfig::Type::kRtp:
-      return open_rtp(rtp_options(config, decode, copy_to));
+      return open_rtp(rtp_options(config, decode));
     case VideoConfig::Type::kMjpeg:
-      return open_mjpeg(streamed_options<MjpegSourceOptions>(config, decode, copy_to));
+      return open_mjpeg(streamed_options<MjpegSourceOptions>(config, decode));
     case VideoConfig::Type::kV4l2:
-      return open_v4l2(v4l2_options(config, decode, copy_to));
+      return open_v4l2(v4l2_options(config, decode));
     case VideoConfig::Type::kRecording:
       return open_recorded_frames(RecordingFrameSourceOptions{config.directory, decode, true});
     case VideoConfig::Type::kCount:

@@ -62,10 +62,8 @@ OrientationStepOptions step_options(const Config& config, const PublishedCalibra
 OrientationStepOptions step_options(const RecordingNoise& noise,
                                     const PublishedCalibration& calibration);
 
-// Never null. decode: frames have images. copy_to: the file to which a live stream is copied;
-// empty: none. A recording is not copied.
-std::unique_ptr<FrameSource> make_frame_source(const VideoConfig& config, bool decode,
-                                               const std::string& copy_to = "");
+// Never null. decode: frames have images.
+std::unique_ptr<FrameSource> make_frame_source(const VideoConfig& config, bool decode);
 // Never null. With type `none` the stream ends at once (ReadStatus::kEnd).
 std::unique_ptr<PanTiltSource> make_pan_tilt_source(const PanTiltConfig& config);
 

@@ -17,6 +17,7 @@
 #include "edge_app/commands/run.h"
 #include "edge_app/commands/run_report.h"
 #include "edge_app/commands/scene_loading.h"
+#include "edge_app/commands/side_files.h"
 #include "edge_app/commands/stop_signals.h"
 #include "edge_app/output/http/http_server.h"
 #include "edge_app/output/http_api.h"
@@ -112,6 +113,17 @@ std::unique_ptr<MqttPublisher> make_mqtt(const Config& config, LiveTargets* targ
   return mqtt;
 }
 
+// Null if no directory for recordings is configured.
+std::unique_ptr<LiveRecorder> make_recorder(const Config& config, FrameSource* video) {
+  if (config.output.recordings.empty()) return nullptr;
+  LiveRecorderOptions options;
+  options.parent = config.output.recordings;
+  options.write_side_files = [config](const std::string& directory, std::string* error) {
+    return write_side_files(config, directory, error);
+  };
+  return std::make_unique<LiveRecorder>(*video, std::move(options));
+}
+
 // Waits for a signal, the end of the pipeline or the end of the duration. Gives back which it was,
 // for people.
 std::string wait_for_the_end(StopSignals* signals, const Pipeline& pipeline, LifeReport* report,
@@ -185,6 +197,8 @@ int run_live(const RunOptions& options) {
   const auto scene = load_scene(config, calibration);
   std::optional<SceneTap> scene_tap;
   if (scene) of_pipeline.scene = &scene_tap.emplace(*scene, scene_tap_options(config.scene_map));
+  const std::unique_ptr<LiveRecorder> recorder = make_recorder(config, video.get());
+  of_pipeline.recorder = recorder.get();
   Pipeline pipeline(*video, *pan_tilt, sinks, calibrating.calibration.get(), of_pipeline);
   HttpApiSources sources;
   sources.live = &live;
@@ -208,6 +222,7 @@ int run_live(const RunOptions& options) {
       sources.detectors = [&targets] { return targets->detectors(); };
   }
   sources.mqtt = mqtt.get();
+  sources.recorder = recorder.get();
   if (scene) {
     sources.scene = [&scene] { return scene->report(); };
     sources.scene_outlines = &scene->outlines();
@@ -234,6 +249,7 @@ int run_live(const RunOptions& options) {
   manager.stopping();
   if (http) http->stop();
   if (targets) targets->stop();
+  if (recorder) static_cast<void>(recorder->end());
   pipeline.stop();
   if (mqtt) mqtt->stop();
 

@@ -216,6 +216,8 @@ OutputConfig read_output(YamlSection section, const std::string& path,
     if (json && !*json && !csv) output.stdout_format.reset();
   }
   if (const auto file = section.text("targets")) output.targets = path_relative_to(path, *file);
+  if (const auto directory = section.text("recordings"))
+    output.recordings = path_relative_to(path, *directory);
   section.finish();
   return output;
 }
@@ -323,6 +325,23 @@ void check_targets(const Config& config, const YamlSection& output) {
                 "is given without http, over which detections come; add http, or detectors");
 }
 
+// Recordings are begun over HTTP.
+void check_recordings(const Config& config, const YamlSection& output) {
+  if (config.output.recordings.empty()) return;
+  if (!config.output.http)
+    output.fail("recordings", "is given without http, over which recordings are begun; add http");
+  if (config.video.type == VideoConfig::Type::kRecording) {
+    output.fail("recordings",
+                "is given, but video.type is recording, which is stored already; leave "
+                "it out, or name a live source");
+  }
+  if (config.pan_tilt.type == PanTiltConfig::Type::kNone) {
+    output.fail("recordings",
+                "is given, but a recording needs telemetry, and pan_tilt.type is none; "
+                "leave it out, or name the pan/tilt source");
+  }
+}
+
 void read_config(YamlSection& top, const std::string& path, ConfigScope scope, Config* config) {
   const YamlSection video = top.section("video");
   const YamlSection pan_tilt = top.section("pan_tilt");
@@ -363,6 +382,7 @@ void read_config(YamlSection& top, const std::string& path, ConfigScope scope, C
   check_together(*config, calibration, scene_map, path, &config->warnings);
   check_detectors(*config, detectors);
   check_targets(*config, output);
+  check_recordings(*config, output);
 }
 
 }  // namespace

@@ -81,6 +81,8 @@ struct OutputConfig {
   std::optional<OutputFormat> stdout_format = OutputFormat::kJson;  // empty: nothing on stdout
   std::optional<HttpServerOptions> http;                            // empty: no server
   std::string targets;  // file to which targets are appended as JSON Lines; empty: none
+  std::string
+      recordings;  // directory for recordings that the page or API begins; empty: none can be
 };
 
 struct Config {

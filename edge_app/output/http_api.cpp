@@ -159,6 +159,40 @@ ServerResponse calibrate(const HttpApiSources& sources, CalibrationPause* pause)
   return response;
 }
 
+constexpr const char* kNothingStored =
+    "nothing is stored here: set output.recordings to a directory";
+
+ServerResponse begin_recording(const HttpApiSources& sources, const std::string& body) {
+  constexpr int kDeepest = 1;  // {"duration_s": S}
+  if (sources.recorder == nullptr) return http_error(409, kNothingStored);
+  Json object;
+  std::string error;
+  if (!parse_json_object(body, kDeepest, {"duration_s"}, &object, &error))
+    return http_error(400, error);
+  const auto duration = object.find("duration_s");
+  if (duration == object.end() || !duration->is_number())
+    return http_error(400, "duration_s must be given as a number, s");
+  switch (sources.recorder->begin(duration->get<double>(), &error)) {
+    case LiveRecorder::Begin::kBegun:
+      break;
+    case LiveRecorder::Begin::kBadDuration:
+      return http_error(400, error);
+    case LiveRecorder::Begin::kUnderWay:
+      return http_error(409, error);
+    case LiveRecorder::Begin::kFailed:
+      return http_error(507, error);
+  }
+  ServerResponse response = json_response(recording_json(sources.recorder->state()));
+  response.status = 202;
+  return response;
+}
+
+ServerResponse end_recording(const HttpApiSources& sources) {
+  if (sources.recorder == nullptr) return http_error(409, kNothingStored);
+  if (!sources.recorder->end()) return http_error(409, "no recording is under way");
+  return json_response(recording_json(sources.recorder->state()));
+}
+
 ServerResponse stream_ticket(HttpTickets* tickets) {
   return json_response(
       {{"ticket", tickets->issue(monotonic_now_s())}, {"valid_s", HttpTickets::kValidS}});
@@ -376,6 +410,11 @@ void add_api_routes(HttpServer* server, const HttpApiSources& sources) {
                [sources, pause = std::make_shared<CalibrationPause>()](const ServerRequest&) {
                  return calibrate(sources, pause.get());
                });
+  server->post(
+      "/api/v1/recording", HttpAccess::kControl, kMaxQueryBytes,
+      [sources](const ServerRequest& request) { return begin_recording(sources, request.body); });
+  server->post("/api/v1/recording/end", HttpAccess::kControl, kMaxQueryBytes,
+               [sources](const ServerRequest&) { return end_recording(sources); });
   server->post("/api/v1/hold", HttpAccess::kToken, kMaxQueryBytes,
                [sources](const ServerRequest& request) { return hold(sources, request.body); });
   server->post(

@@ -1,7 +1,7 @@
 #pragma once
 // The HTTP endpoints of `alidade run`, described by openapi.yaml. They give the data of LiveState
 // and pipeline as JSON, Server-Sent Events and Prometheus text, and take detections, held frames,
-// plane fits and requests for a calibration. Handlers run on the server's threads. Nothing here
+// plane fits and requests for a calibration or a recording. Handlers run on the server's threads. Nothing here
 // touches the real-time thread.
 
 #include <functional>
@@ -17,6 +17,7 @@
 #include "edge_app/output/target_lines.h"
 #include "edge_app/pipeline/pipeline.h"
 #include "edge_app/step/scene_report.h"
+#include "edge_app/taps/live_recorder.h"
 #include "edge_app/tracking/built_in_detectors.h"
 #include "edge_app/tracking/target_feed.h"
 #include "platform/video/frame_source.h"
@@ -48,6 +49,7 @@ struct HttpApiSources {
   TargetLines* target_lines = nullptr;
   std::function<DetectorsReport()> detectors;  // empty: no built-in detector
   const MqttPublisher* mqtt = nullptr;         // null: no broker
+  LiveRecorder* recorder = nullptr;            // null: nothing is stored on request
   std::function<SceneReport()> scene;          // empty: no scene map is in use
   // What the scene map's keyframes show; null: no scene map is in use.
   const std::vector<SceneOutline>* scene_outlines = nullptr;

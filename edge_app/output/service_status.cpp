@@ -161,6 +161,7 @@ nlohmann::ordered_json service_status(const HttpApiSources& sources, const HttpC
   }
   out["detectors"] = sources.detectors ? detectors_json(sources.detectors()) : Json();
   out["scene_map"] = sources.scene ? scene_json(sources.scene(), now_s) : Json();
+  out["recording"] = sources.recorder ? recording_json(sources.recorder->state()) : Json();
   out["page_faults"] = {{"minor", summary.page_faults.minor}, {"major", summary.page_faults.major}};
   Json clients = Json::array();
   for (const ReaderCounters& reader : sources.live->readers())
@@ -173,6 +174,18 @@ nlohmann::ordered_json service_status(const HttpApiSources& sources, const HttpC
                  {"stalled", http.stalled},
                  {"connections", http.connections}};
   return out;
+}
+
+nlohmann::ordered_json recording_json(const LiveRecording& recording) {
+  const bool any = !recording.directory.empty();
+  return {{"under_way", recording.under_way},
+          {"directory", any ? Json(recording.directory) : Json()},
+          {"asked_s", any ? Json(recording.asked_s) : Json()},
+          {"length_s", recording.length_s},
+          {"frames", recording.frames},
+          {"samples", recording.samples},
+          {"left_out", recording.left_out},
+          {"error", recording.error.empty() ? Json() : Json(recording.error)}};
 }
 
 }  // namespace alidade

@@ -11,4 +11,7 @@ namespace alidade {
 [[nodiscard]] nlohmann::ordered_json service_status(const HttpApiSources& sources,
                                                     const HttpCounters& http);
 
+// What the status says of recordings, and the answer of POST /api/v1/recording.
+[[nodiscard]] nlohmann::ordered_json recording_json(const LiveRecording& recording);
+
 }  // namespace alidade

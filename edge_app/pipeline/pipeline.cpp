@@ -188,7 +188,9 @@ void Pipeline::capture() {
   const auto on_frame = [&](const Frame& frame) {
     if (!decodes) take_place(ThreadDuty::kDecoding);
     decodes = true;
-    return push(frame);
+    const bool goes_on = push(frame);
+    if (options_.recorder != nullptr) options_.recorder->take(frame);
+    return goes_on;
   };
   const auto on_loss = [this](double now_s) {
     VideoMessage message;
@@ -207,6 +209,7 @@ void Pipeline::read_telemetry() {
   take_place(ThreadDuty::kBrief);
   const auto on_sample = [this](const PanTiltSample& sample) {
     stage_.push(TelemetryMessage{TelemetryMessage::Kind::kSample, sample});
+    if (options_.recorder != nullptr) options_.recorder->take(sample);
     return true;
   };
   const auto on_loss = [this](double) {

@@ -30,6 +30,7 @@
 #include "edge_app/pipeline/record_log.h"
 #include "edge_app/record/reason_counts.h"
 #include "edge_app/self_calibration/self_calibration.h"
+#include "edge_app/taps/live_recorder.h"
 #include "platform/pan_tilt/pan_tilt_source.h"
 #include "platform/system/priority_mutex.h"
 #include "platform/system/realtime.h"
@@ -49,6 +50,7 @@ struct PipelineOptions {
   ImageTap* tap = nullptr;           // borrowed, like the sources; null: no images are wanted
   SceneTap* scene = nullptr;         // likewise; null: there is no scene map
   DetectorTap* detectors = nullptr;  // likewise; null: there is no detector
+  LiveRecorder* recorder = nullptr;  // likewise; null: nothing is to be stored
 };
 
 struct PipelineSummary {

@@ -10,6 +10,8 @@
 
 namespace alidade {
 
+struct StreamPicture;  // platform/video/stream_copy.h
+
 // The message to the user about interlaced video.
 inline constexpr const char* kInterlaced =
     "the video is interlaced: every second row is captured half a frame later, which the camera "
@@ -53,6 +55,10 @@ struct Frame {
   // s; time that read() took to decode luma, without waiting and queueing. nullopt: not decoded, or
   // not measured.
   std::optional<double> decode_s;
+  // The picture as the stream carries it. Null unless FrameSource::keep_stream() asked for it, for a
+  // picture that cannot be decoded, or needs one that could not, and for one of more than
+  // max_pixels.
+  std::shared_ptr<const StreamPicture> coded;
 };
 
 }  // namespace alidade

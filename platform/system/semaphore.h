@@ -3,8 +3,10 @@
 // call it; wait() sleeps until a post. POSIX semaphore (a futex underneath).
 
 #include <semaphore.h>
+#include <time.h>
 
 #include <cerrno>
+#include <cmath>
 
 namespace alidade {
 
@@ -18,6 +20,13 @@ class Semaphore {
   void post() { sem_post(&semaphore_); }
   void wait() {
     while (sem_wait(&semaphore_) != 0 && errno == EINTR) {
+    }
+  }
+  // Until a post, at most until end_s (s, CLOCK_MONOTONIC, 0 or more).
+  void wait_until(double end_s) {
+    const double whole_s = std::floor(end_s);
+    const timespec end{static_cast<time_t>(whole_s), static_cast<long>(1e9 * (end_s - whole_s))};
+    while (sem_clockwait(&semaphore_, CLOCK_MONOTONIC, &end) != 0 && errno == EINTR) {
     }
   }
 

@@ -34,6 +34,10 @@ class FrameSource {
   // reconnects after a growing pause. False: the source has no connection to close.
   [[nodiscard]] virtual bool refuse(const std::string& /*reason*/) { return false; }
 
+  // Thread-safe. Whether the next frames hold their pictures as the stream carries them
+  // (Frame::coded). At first they do not. False: this source is no live stream, and they never do.
+  virtual bool keep_stream(bool /*keep*/) { return false; }
+
   // Thread-safe, idempotent. Every later read() returns kStopped.
   virtual void stop() = 0;
 

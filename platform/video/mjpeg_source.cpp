@@ -40,6 +40,10 @@ class MjpegSource : public FrameSource {
     return {damaged_ + (connection_ ? connection_->damaged() : 0), thread_.dropped(), unstamped_};
   }
   std::string remark() override { return remarks_.take(); }
+  bool keep_stream(bool keep) override {
+    keeps_stream_ = keep;
+    return true;
+  }
 
  private:
   ReadStatus fail(const std::string& error) {
@@ -48,6 +52,8 @@ class MjpegSource : public FrameSource {
     return ReadStatus::kFailed;
   }
   ReadStatus deliver(MultipartPart part, Frame& frame);
+  [[nodiscard]] std::shared_ptr<const StreamPicture> coded(const std::string& jpeg, int width,
+                                                           int height) const;
   void stamp_sender_time(const MultipartPart& part, FrameStamp* stamp);
 
   MjpegSourceOptions options_;
@@ -55,6 +61,7 @@ class MjpegSource : public FrameSource {
 
   std::atomic<std::int64_t> damaged_{0};
   std::atomic<std::int64_t> unstamped_{0};
+  std::atomic<bool> keeps_stream_{false};
   Remarks remarks_;
   std::optional<MjpegConnection> connection_;  // none: the options are wrong
 
@@ -68,8 +75,7 @@ class MjpegSource : public FrameSource {
   std::optional<double> last_sender_time_s_;  // of this connection, unchecked
   StampGuard stamps_;
   JpegDecoder decoder_;
-  CodecParametersPtr parameters_ = picture_parameters(AV_CODEC_ID_MJPEG);
-  StreamCopy copy_;
+  std::shared_ptr<const AVCodecParameters> parameters_ = picture_parameters(AV_CODEC_ID_MJPEG);
 
   // Last, as its thread uses the other members.
   ReceivingThread<MultipartPart> thread_{options_.max_backoff_s,
@@ -127,10 +133,6 @@ ReadStatus MjpegSource::deliver(MultipartPart part, Frame& frame) {
   const double before_s = monotonic_now_s();
   bool usable = decoder_.read_size(part.body, &picture.width, &picture.height);
   const bool fits = std::int64_t{picture.width} * picture.height <= options_.max_pixels;
-  if (usable && !fits && !options_.copy_to.empty()) {
-    ++damaged_;
-    return ReadStatus::kTimeout;
-  }
   if (usable && fits && options_.decode) usable = decoder_.decode(part.body, &picture);
   if (!usable) {
     ++damaged_;
@@ -144,30 +146,27 @@ ReadStatus MjpegSource::deliver(MultipartPart part, Frame& frame) {
   }
   damaged_in_a_row_ = 0;
   const double decode_s = monotonic_now_s() - before_s;
-  if (!options_.copy_to.empty()) {
-    const PacketPtr packet = make_picture_packet(part.body.size());
-    std::string error;
-    if (!packet) {
-      return fail("no memory for a picture");
-    }
-    std::memcpy(packet->data, part.body.data(), part.body.size());
-    if (!copy_.add(options_.copy_to, *parameters_, picture.width, picture.height, *packet,
-                   part.first_byte_s, &error)) {
-      if (!copy_.is_another_stream()) return fail(error);
-      thread_.refuse(error);
-      return ReadStatus::kTimeout;
-    }
-  }
   frame = Frame{};
   frame.stamp.frame = next_frame_++;
   frame.stamp.receive_time_s = part.first_byte_s;
   frame.stamp.restarted = std::exchange(restarted_, false);
   stamp_sender_time(part, &frame.stamp);
+  if (keeps_stream_ && fits) frame.coded = coded(part.body, picture.width, picture.height);
   set_picture(std::move(picture), &frame);
   if (options_.decode && fits) {
     frame.decode_s = decode_s;
   }
   return ReadStatus::kOk;
+}
+
+// Null without memory.
+std::shared_ptr<const StreamPicture> MjpegSource::coded(const std::string& jpeg, int width,
+                                                        int height) const {
+  PacketPtr packet = make_picture_packet(jpeg.size());
+  if (!packet) return nullptr;
+  std::memcpy(packet->data, jpeg.data(), jpeg.size());
+  return std::make_shared<StreamPicture>(
+      StreamPicture{std::move(packet), parameters_, width, height, true});
 }
 
 void MjpegSource::stamp_sender_time(const MultipartPart& part, FrameStamp* stamp) {

@@ -27,11 +27,9 @@ struct MjpegSourceOptions {
   bool decode = true;        // false: Frame::luma stays null, only the JPEG headers are read
   double timeout_s = 3;      // after so long without a picture the connection counts as lost
   double max_backoff_s = 5;  // longest pause between two attempts
-  // A larger picture is not decoded: its frame has its size, but no luma. With copy_to it gives no
-  // frame and counts as damaged. A part longer than such a picture can be (most_picture_bytes) is
-  // discarded.
+  // A larger picture is not decoded: its frame has its size, but no luma. A part longer than such a
+  // picture can be (most_picture_bytes) is discarded.
   std::int64_t max_pixels = kMostLivePixels;
-  std::string copy_to;  // video.mkv to copy the pictures to; empty: none
 };
 
 [[nodiscard]] std::unique_ptr<FrameSource> open_mjpeg(const MjpegSourceOptions& options);

@@ -59,6 +59,10 @@ class RtpSource : public FrameSource {
   }
   std::string waiting() const override;
   std::string remark() override { return remarks_.take(); }
+  bool keep_stream(bool keep) override {
+    keeps_stream_ = keep;
+    return true;
+  }
 
  private:
   // How much of a connection's counts was added to the counters.
@@ -94,6 +98,7 @@ class RtpSource : public FrameSource {
   }
   ReadStatus deliver(Arrived arrived, Frame& frame);
   void give(const AccessUnit& unit, int width, int height, Frame& frame);
+  [[nodiscard]] std::shared_ptr<const StreamPicture> coded(AccessUnit* unit);
   [[nodiscard]] bool can_be_decoded(const AccessUnit& unit);
   ReadStatus decode(AccessUnit* unit, Picture* picture);
   void spoil();
@@ -105,6 +110,7 @@ class RtpSource : public FrameSource {
   std::atomic<std::int64_t> unstamped_{0};
   std::atomic<std::int64_t> foreign_packets_{0};
   std::atomic<std::int64_t> garbage_bytes_{0};
+  std::atomic<bool> keeps_stream_{false};
   Remarks remarks_;
 
   // Since when pictures have come that need a key frame before them (CLOCK_MONOTONIC); < 0: none is
@@ -131,11 +137,15 @@ class RtpSource : public FrameSource {
   std::shared_ptr<const AVCodecParameters> parameters_;
   LumaDecoder decoder_;
   bool spoilt_ = false;  // a picture that later ones depend on is lost or damaged
+  // Likewise, and no picture has come since that needs none before it: where decoding could go on,
+  // a file would not show that a picture is missing.
+  bool gap_ = false;
+  bool kept_from_start_ = false;  // of this connection
+  bool any_kept_ = false;         // of this connection
   std::deque<AccessUnit> in_decoder_;
   bool size_known_ = false;  // of this connection's pictures
   int width_ = 0;
   int height_ = 0;
-  StreamCopy copy_;
 
   // Last, as its thread uses the other members.
   ReceivingThread<Arrived> thread_{options_.max_backoff_s,
@@ -287,46 +297,44 @@ ReadStatus RtpSource::read(Frame& frame, double timeout_s) {
 // Makes a frame from a picture's data; kTimeout if this picture gives none.
 ReadStatus RtpSource::deliver(Arrived arrived, Frame& frame) {
   AccessUnit unit = std::move(arrived.unit);
+  const bool keeps = keeps_stream_;
   restarted_ = restarted_ || unit.begins_anew;
   if (arrived.parameters != parameters_) {
     parameters_ = std::move(arrived.parameters);
     in_decoder_.clear();
     size_known_ = false;
     spoilt_ = false;
+    gap_ = false;
+    kept_from_start_ = keeps;
+    any_kept_ = false;
     if (!decoder_.open(*parameters_, true, with_whole_blocks(options_.max_pixels))) {
       return fail_or_refuse(decoder_.error());
     }
   }
   Picture picture;
   const double before_s = monotonic_now_s();
-  const bool copies = !options_.copy_to.empty();
   if (unit.too_large) {
     spoil();
-    if (copies) {
-      ++damaged_;
-      return ReadStatus::kTimeout;
-    }
     give(unit, unit.width, unit.height, frame);
     return ReadStatus::kOk;
   }
-  if (options_.decode || copies || !size_known_) {
+  bool can_be_kept = keeps;
+  if (options_.decode || keeps || !size_known_) {
     const bool decodable = can_be_decoded(unit);
-    if (!decodable && (copies || !unit.whole)) return ReadStatus::kTimeout;
+    if (!decodable && !unit.whole) return ReadStatus::kTimeout;
+    can_be_kept = can_be_kept && decodable && !gap_;
     if (decodable && (options_.decode || !size_known_)) {
       const ReadStatus status = decode(&unit, &picture);
       if (status == ReadStatus::kFailed) return status;
       const bool begins = !spoilt_ && decoder_.is_beginning();
-      if (status != ReadStatus::kOk && (copies || !begins)) return status;
+      if (status != ReadStatus::kOk && !begins) return status;
+      can_be_kept = can_be_kept && status == ReadStatus::kOk;
     }
   }
   if (!size_known_) return ReadStatus::kTimeout;
   const double decode_s = monotonic_now_s() - before_s;
-  std::string error;
-  if (copies && !copy_.add(options_.copy_to, *parameters_, width_, height_, *unit.packet,
-                           unit.receive_time_s, &error)) {
-    return copy_.is_another_stream() ? fail_or_refuse(error) : fail(std::move(error));
-  }
   give(unit, width_, height_, frame);
+  if (can_be_kept) frame.coded = coded(&unit);
   if (options_.decode && picture.luma != nullptr) {
     frame.luma = picture.luma;
     frame.stride = picture.stride;
@@ -349,26 +357,33 @@ void RtpSource::give(const AccessUnit& unit, int width, int height, Frame& frame
   frame.height = height;
 }
 
+std::shared_ptr<const StreamPicture> RtpSource::coded(AccessUnit* unit) {
+  const bool first = !std::exchange(any_kept_, true);
+  return std::make_shared<StreamPicture>(StreamPicture{std::move(unit->packet), parameters_, width_,
+                                                       height_,
+                                                       unit->key || (first && kept_from_start_)});
+}
+
 // True if the picture and all that it depends on are complete. After a loss that holds again from
-// the next picture at which decoding can start; in a copy, whose readers do not know of the loss,
-// from the next at which it starts at once.
+// the next picture at which decoding can start.
 bool RtpSource::can_be_decoded(const AccessUnit& unit) {
   if (!unit.whole) ++damaged_;
   if (!unit.whole || !unit.follows) spoil();
-  if (!spoilt_) return true;
-  const bool begins =
-      options_.copy_to.empty() ? unit.key : (unit.packet->flags & AV_PKT_FLAG_KEY) != 0;
-  if (!unit.whole || !begins) return false;
-  decoder_.flush();
-  in_decoder_.clear();
-  spoilt_ = false;
-  if (!options_.decode && size_known_) no_key_after_loss_since_s_ = -1;
+  if (unit.whole && (unit.packet->flags & AV_PKT_FLAG_KEY) != 0) gap_ = false;
+  if (spoilt_) {
+    if (!unit.whole || !unit.key) return false;
+    decoder_.flush();
+    in_decoder_.clear();
+    spoilt_ = false;
+  }
+  if (!options_.decode && size_known_ && !gap_) no_key_after_loss_since_s_ = -1;
   return true;
 }
 
 // Later pictures cannot be decoded, as one that they depend on is missing.
 void RtpSource::spoil() {
   spoilt_ = true;
+  gap_ = true;
   begin_waiting(&no_key_after_loss_since_s_);
 }
 

@@ -35,10 +35,8 @@ struct RtpSourceOptions {
   std::string certificate_file;
   double timeout_s = 3;      // after so long without a whole picture the connection is lost
   double max_backoff_s = 5;  // longest pause between two attempts
-  // H.264 and H.265: a larger picture is not decoded: its frame has its size, but no luma. With
-  // copy_to it gives no frame and counts as damaged.
+  // H.264 and H.265: a larger picture is not decoded: its frame has its size, but no luma.
   std::int64_t max_pixels = kMostLivePixels;
-  std::string copy_to;  // video.mkv to copy the stream to; empty: none
 };
 
 [[nodiscard]] std::unique_ptr<FrameSource> open_rtp(const RtpSourceOptions& options);

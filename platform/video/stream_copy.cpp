@@ -58,7 +58,7 @@ bool same_extradata(const AVCodecParameters& a, const AVCodecParameters& b) {
 
 }  // namespace
 
-CodecParametersPtr picture_parameters(AVCodecID codec) {
+std::shared_ptr<const AVCodecParameters> picture_parameters(AVCodecID codec) {
   CodecParametersPtr parameters(avcodec_parameters_alloc());
   parameters->codec_type = AVMEDIA_TYPE_VIDEO;
   parameters->codec_id = codec;
@@ -88,22 +88,22 @@ StreamCopy::~StreamCopy() {
   }
 }
 
-int StreamCopy::create(const std::string& path, const AVCodecParameters& parameters, int width,
-                       int height, const AVPacket& first) {
+int StreamCopy::create(const std::string& path, const StreamPicture& first) {
+  path_ = path;
   parameters_.reset(avcodec_parameters_alloc());
-  int code = avcodec_parameters_copy(parameters_.get(), &parameters);
+  int code = avcodec_parameters_copy(parameters_.get(), first.parameters.get());
   if (code < 0) {
     return code;
   }
-  parameters_->width = width;
-  parameters_->height = height;
+  parameters_->width = first.width;
+  parameters_->height = first.height;
   if (parameters_->codec_id != AV_CODEC_ID_RAWVIDEO) {  // its tag is the pixel format
     parameters_->codec_tag = 0;
   }
   const bool has_sets =
       parameters_->codec_id == AV_CODEC_ID_H264 || parameters_->codec_id == AV_CODEC_ID_HEVC;
   if (has_sets && parameters_->extradata_size == 0) {
-    code = fill_extradata(first, parameters_.get());
+    code = fill_extradata(*first.packet, parameters_.get());
     if (code < 0) {
       return code;
     }
@@ -129,26 +129,32 @@ int StreamCopy::create(const std::string& path, const AVCodecParameters& paramet
   return code;
 }
 
-bool StreamCopy::add(const std::string& path, const AVCodecParameters& parameters, int width,
-                     int height, const AVPacket& picture, double receive_time_s,
+std::string StreamCopy::fault_of(const StreamPicture& picture) const {
+  if (format_ == nullptr) return "";
+  const AVCodecParameters& parameters = *picture.parameters;
+  if (parameters.codec_id != parameters_->codec_id || picture.width != parameters_->width ||
+      picture.height != parameters_->height || !same_extradata(parameters, *parameters_)) {
+    const auto size = [](int width, int height) {
+      return std::to_string(width) + "x" + std::to_string(height);
+    };
+    return path_ + " began as " + avcodec_get_name(parameters_->codec_id) + " of " +
+           size(parameters_->width, parameters_->height) + ", the stream is now another one (" +
+           avcodec_get_name(parameters.codec_id) + " " + size(picture.width, picture.height) +
+           "): start a new recording";
+  }
+  return "";
+}
+
+bool StreamCopy::add(const std::string& path, const StreamPicture& picture, double receive_time_s,
                      std::string* error) {
   int code = 0;
-  another_ = false;
   if (format_ == nullptr) {
-    code = create(path, parameters, width, height, picture);
+    code = create(path, picture);
     first_receive_time_s_ = receive_time_s;
-  } else if (parameters.codec_id != parameters_->codec_id || width != parameters_->width ||
-             height != parameters_->height || !same_extradata(parameters, *parameters_)) {
-    another_ = true;
-    *error = path + " began as " + avcodec_get_name(parameters_->codec_id) + " of " +
-             std::to_string(parameters_->width) + "x" + std::to_string(parameters_->height) +
-             ", the stream is now another one (" + avcodec_get_name(parameters.codec_id) + " " +
-             std::to_string(width) + "x" + std::to_string(height) + "): start a new recording";
-    return false;
   }
   if (code >= 0) {
     const AVStream& stream = *format_->streams[0];
-    const PacketPtr packet(av_packet_clone(&picture));
+    const PacketPtr packet(av_packet_clone(picture.packet.get()));
     const double since_first_s = receive_time_s - first_receive_time_s_;
     const auto pts =
         static_cast<std::int64_t>(std::llround(since_first_s / av_q2d(stream.time_base)));

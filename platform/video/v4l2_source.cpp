@@ -55,14 +55,18 @@ class V4l2Source : public FrameSource {
   std::string error() const override { return error_; }
   std::string name() const override { return options_.device; }
   FrameSourceCounters counters() const override { return {damaged_, dropped_}; }
+  bool keep_stream(bool keep) override {
+    keeps_stream_ = keep;
+    return true;
+  }
 
  private:
   ReadStatus connect(double end_s);
   ReadStatus take(Frame& frame);
   bool take_picture(const V4l2Device::Buffer& buffer, const std::shared_ptr<const void>& held,
                     Picture* picture);
-  bool store(const V4l2Device::Buffer& buffer, const Picture& picture, double receive_time_s,
-             std::string* error);
+  [[nodiscard]] std::shared_ptr<const StreamPicture> coded(const V4l2Device::Buffer& buffer,
+                                                           const Picture& picture) const;
   bool wait(int fd, double end_s, bool* gone);
   void close();
   ReadStatus lose(const std::string& error);
@@ -77,6 +81,7 @@ class V4l2Source : public FrameSource {
   std::atomic<bool> stopped_{false};
   std::atomic<std::int64_t> damaged_{0};
   std::atomic<std::int64_t> dropped_{0};
+  std::atomic<bool> keeps_stream_{false};
 
   std::string error_;
   bool failed_ = false;
@@ -92,8 +97,8 @@ class V4l2Source : public FrameSource {
   std::int64_t next_frame_ = 0;
   JpegDecoder decoder_;
   LumaPool pool_;
-  CodecParametersPtr parameters_;  // of the stored pictures: JPEG unchanged, or uncompressed luma
-  StreamCopy copy_;
+  // Of Frame::coded: JPEG unchanged, or uncompressed luma.
+  std::shared_ptr<const AVCodecParameters> parameters_;
 };
 
 void V4l2Source::close() {
@@ -208,16 +213,13 @@ ReadStatus V4l2Source::take(Frame& frame) {
     return ReadStatus::kTimeout;
   }
   const double decode_s = monotonic_now_s() - before_s;
-  std::string error;
-  if (!options_.copy_to.empty() && !store(buffer, picture, stamp.receive_time_s, &error)) {
-    return fail(error);
-  }
   frame = Frame{};
   frame.stamp.frame = next_frame_++;
   frame.stamp.receive_time_s = stamp.receive_time_s;
   frame.stamp.stamped_at = stamp.stamped_at;
   frame.stamp.sequence = stamp.sequence;
   frame.stamp.restarted = std::exchange(restarted_, false);
+  if (keeps_stream_) frame.coded = coded(buffer, picture);
   set_picture(std::move(picture), &frame);
   if (options_.decode) {
     frame.decode_s = decode_s;
@@ -262,23 +264,21 @@ bool V4l2Source::take_picture(const V4l2Device::Buffer& buffer,
   return true;
 }
 
-bool V4l2Source::store(const V4l2Device::Buffer& buffer, const Picture& picture,
-                       double receive_time_s, std::string* error) {
+// Null without memory.
+std::shared_ptr<const StreamPicture> V4l2Source::coded(const V4l2Device::Buffer& buffer,
+                                                       const Picture& picture) const {
   const V4l2Format format = device_->format();
   const bool jpeg = format == V4l2Format::kMjpg;
   const std::size_t bytes = jpeg ? buffer.bytes : pixels(picture);
-  const PacketPtr packet = make_picture_packet(bytes);
-  if (!packet) {
-    *error = "no memory for a picture";
-    return false;
-  }
+  PacketPtr packet = make_picture_packet(bytes);
+  if (!packet) return nullptr;
   if (jpeg) {
     std::memcpy(packet->data, buffer.data, bytes);
   } else {
     copy_luma(format, buffer.data, picture.width, picture.height, device_->stride(), packet->data);
   }
-  return copy_.add(options_.copy_to, *parameters_, picture.width, picture.height, *packet,
-                   receive_time_s, error);
+  return std::make_shared<StreamPicture>(
+      StreamPicture{std::move(packet), parameters_, picture.width, picture.height, true});
 }
 
 }  // namespace

@@ -23,7 +23,6 @@ struct V4l2SourceOptions {
   bool decode = true;        // false: Frame::luma stays null
   double timeout_s = 3;      // after so long without a picture the device counts as lost
   double max_backoff_s = 5;  // longest pause between two attempts
-  std::string copy_to;       // video.mkv to store the pictures in; empty: none
 };
 
 [[nodiscard]] std::unique_ptr<FrameSource> open_v4l2(const V4l2SourceOptions& options);

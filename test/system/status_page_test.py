@@ -6,6 +6,7 @@ import math
 import os
 import re
 import signal
+import subprocess
 import unittest
 import urllib.error
 import urllib.request
@@ -16,7 +17,7 @@ from selenium.webdriver.chrome.options import Options
 from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.by import By
 
-from harness import CLOCK_OFFSET_MS, DEADLINE_S, SystemTest, free_port, wait_until
+from harness import ALIDADE, CLOCK_OFFSET_MS, DEADLINE_S, SystemTest, free_port, wait_until
 
 SETTINGS = {
     "image": {"width": 640, "height": 480, "rate_hz": 10},
@@ -511,7 +512,8 @@ class StatusPage(SystemTest):
         image = SETTINGS["image"]
         config = self.write_config(
             camera, video={"width": image["width"], "height": image["height"]}, focal_length_px=SETTINGS["camera"]["focal_length_px"],
-            calibration={"file": str(self.folder / "calibration.yaml")}, realtime={"mode": "OE"}, output={"json": True, "http": "127.0.0.1:0"})
+            calibration={"file": str(self.folder / "calibration.yaml")}, realtime={"mode": "OE"},
+            output={"json": True, "http": "127.0.0.1:0", "recordings": str(self.folder / "recordings")})
         _, address = self.start(config)
         self.browser.get(address)
         self.wait_for_text("link", "^live$")
@@ -531,7 +533,38 @@ class StatusPage(SystemTest):
         self.browser.find_element(By.ID, "anew").send_keys(Keys.ENTER)
         self.wait_for_text("anew-said", r"^Not begun: a fresh calibration was begun \d+ s ago; the next may be in \d+ s.$")
         self.shows_goals()
-        self.assert_no_errors_but(f"{LATE}|/api/v1/calibrate.*status of 429")
+        self.records(camera)
+        self.assert_no_errors_but(f"{LATE}|/api/v1/calibrate.*status of 429|/api/v1/recording.*status of 400")
+
+    def records(self, camera):
+        """The button stores so many seconds of both streams, and ends a recording that is under way; meanwhile records go on."""
+        button, seconds = self.browser.find_element(By.ID, "record"), self.browser.find_element(By.ID, "record-seconds")
+        self.assertTrue(button.is_displayed())
+
+        def record_for(text):
+            self.browser.execute_script("arguments[0].value = arguments[1]", seconds, text)
+            button.send_keys(Keys.ENTER)
+
+        record_for("")
+        self.wait_for_text("recorded", r"^Not done: how many seconds\?\.$")
+        record_for("5000")
+        self.wait_for_text("recorded", "^Not done: a recording lasts from 1 to 3600 s.$")
+        record_for("2")
+        self.wait_for_text("recorded", r"recordings/\d{4}-\d\d-\d\dT[-\d]+Z: (1\.9|2\.0|2\.1) s, \d+ frames and \d+ samples of telemetry\.$")
+        record_for("600")
+        self.wait_for_text("record", "^End$")
+        self.wait_for_text("recorded", r": \d+ of 600 s, [1-9]\d* frames and ")
+        self.screenshot("recording.png")
+        button.send_keys(Keys.ENTER)
+        self.wait_for_text("record", "^Record$")
+        recordings = sorted((self.folder / "recordings").iterdir())
+        self.assertEqual(len(recordings), 2)
+        for recording in recordings:
+            done = subprocess.run([ALIDADE, "replay", recording, "--mode", "PT", "--json", "--calibration", camera.truth / "truth.yaml"],
+                                  capture_output=True, text=True, check=True, timeout=60)
+            rows = (recording / "frames.csv").read_text(encoding="utf-8").splitlines()[1:]
+            self.assertEqual(len(done.stdout.splitlines()), len(rows), recording)
+            self.assertTrue((recording / "guess.yaml").is_file())
 
     def shows_goals(self):
         """Bars end left of the line, in the middle, where a sigma is small enough; at a phone's width nothing is cut off."""

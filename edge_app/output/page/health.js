@@ -6,6 +6,7 @@ import {showCalibrationInUse} from './calibration.js';
 import {rows, say} from './elements.js';
 import {isNumber} from './numbers.js';
 import {showProgress} from './progress.js';
+import {showRecording} from './recording.js';
 import {showSceneMap} from './scene_map.js';
 import {connected} from './stream.js';
 import {duration, sleep} from './time.js';
@@ -82,6 +83,7 @@ export async function showStatusForEver() {
         const status = await getJson('/api/v1/status');
         showStatus(status);
         showProgress(status.calibration);
+        showRecording(status.recording);
         await showCalibrationInUse(status);
         await showSceneMap(status);
       } catch {

@@ -296,7 +296,8 @@ TEST_F(ConfigTest, EveryKeyIsRead) {
           "       key_file: own.key, user: eve, password_env: ALIDADE_TEST_PASSWORD,\n"
           "       prefix: site/mast, client_id: mast, qos: 2, keep_alive_s: 20, timeout_s: 3,\n"
           "       max_backoff_s: 60, orientation_rate_hz: 0.5}\n"
-          "output: {csv: true, json: false, http: '127.0.0.1:0', targets: targets.jsonl}\n"),
+          "output: {csv: true, json: false, http: '127.0.0.1:0', targets: targets.jsonl, "
+          "recordings: kept}\n"),
       IsEmpty());
   EXPECT_EQ(config_.video.transport, VideoConfig::Transport::kUdp);
   EXPECT_EQ(config_.video.user, "eve");
@@ -355,6 +356,7 @@ TEST_F(ConfigTest, EveryKeyIsRead) {
   EXPECT_EQ(targets.tracker.max_targets, 64);
   EXPECT_EQ(targets.tracker.max_detections, 100);
   EXPECT_EQ(config_.output.targets, directory_.path() + "/targets.jsonl");
+  EXPECT_EQ(config_.output.recordings, directory_.path() + "/kept");
   EXPECT_FALSE(config_.realtime.landmarks);
   EXPECT_EQ(config_.realtime.priority, 60);
   EXPECT_EQ(config_.realtime.cpu, 3);
@@ -932,6 +934,19 @@ INSTANTIATE_TEST_SUITE_P(
                 ":4: output.targets", "add tracking"},
         Mistake{"TargetsWithoutHttp", MINIMAL "tracking: {}\noutput: {targets: t.jsonl}\n",
                 ":5: output.targets", "add http"},
+        Mistake{"RecordingsWithoutHttp", MINIMAL "output: {recordings: kept}\n",
+                ":4: output.recordings", "add http"},
+        Mistake{"RecordingsOfARecording",
+                "video: {type: recording, directory: d}\n"
+                "pan_tilt: {type: recording, directory: d}\n" CALIBRATION
+                "output: {http: '127.0.0.1:0', recordings: kept}\n",
+                ":4: output.recordings", "which is stored already"},
+        Mistake{"RecordingsWithoutTelemetry",
+                VIDEO "pan_tilt: {type: none}\n"
+                      "calibration: {file: c.yaml, auto: false}\n"
+                      "scene_map: {file: s.map}\n"
+                      "output: {http: '127.0.0.1:0', recordings: kept}\n",
+                ":5: output.recordings", "needs telemetry"},
         Mistake{"NoVideo", PAN_TILT CALIBRATION, ": ", "section 'video' is missing"},
         Mistake{"NoPanTilt", VIDEO CALIBRATION, ": ", "section 'pan_tilt' is missing"},
         Mistake{"NoCalibrationAndNoDataSheet", VIDEO PAN_TILT, ": ",

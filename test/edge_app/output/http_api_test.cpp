@@ -15,7 +15,9 @@
 #include "edge_app/output/detection_query.h"
 #include "platform/system/clock.h"
 #include "test/edge_app/output/http_client.h"
+#include "test/edge_app/taps/kept_stream.h"
 #include "test/edge_app/tracking/detected_scene.h"
+#include "test/support/temporary_directory.h"
 #include "test/support/zoom_by_formula.h"
 
 namespace alidade {
@@ -40,8 +42,9 @@ class HttpApiTest : public ::testing::Test {
  protected:
   explicit HttpApiTest(std::shared_ptr<const PlaneEstimate> plane = nullptr,
                        TargetFeed* feed = nullptr, TargetLines* lines = nullptr,
-                       std::function<SceneReport()> scene = {}) {
+                       std::function<SceneReport()> scene = {}, LiveRecorder* recorder = nullptr) {
     HttpApiSources sources;
+    sources.recorder = recorder;
     sources.targets = feed;
     sources.target_lines = lines;
     sources.live = &live_;
@@ -332,6 +335,51 @@ TEST_F(HttpApiTest, WithoutASceneMapSaysHowToHaveOne) {
   EXPECT_THAT(body_of(answer)["error"].get<std::string>(), HasSubstr("set scene_map.file"));
   EXPECT_THAT(get("/api/v1/map/views"), StartsWith("HTTP/1.1 404 "));
   EXPECT_THAT(get("/metrics"), Not(HasSubstr("alidade_scene_map")));
+}
+
+TEST_F(HttpApiTest, BeginsNoRecordingWithoutAPlaceForIt) {
+  EXPECT_TRUE(body_of(get("/api/v1/status"))["recording"].is_null());
+  for (const char* path : {"/api/v1/recording", "/api/v1/recording/end"}) {
+    const std::string answer = post(path, R"({"duration_s": 10})");
+    EXPECT_THAT(answer, StartsWith("HTTP/1.1 409"));
+    EXPECT_THAT(answer, HasSubstr("set output.recordings to a directory"));
+  }
+}
+
+struct RecordedStream {
+  TemporaryDirectory directory;
+  test::KeptStream video;
+  LiveRecorder recorder{video, {directory.path(), {}}};
+};
+
+// The stream comes first: the server must not outlive it.
+class HttpApiWithRecorderTest : private RecordedStream, public HttpApiTest {
+ protected:
+  HttpApiWithRecorderTest() : HttpApiTest(nullptr, nullptr, nullptr, {}, &recorder) {}
+  using RecordedStream::directory;
+  using RecordedStream::recorder;
+};
+
+TEST_F(HttpApiWithRecorderTest, BeginsAndEndsARecording) {
+  EXPECT_EQ(body_of(get("/api/v1/status"))["recording"],
+            json::parse(R"({"under_way": false, "directory": null, "asked_s": null, "length_s": 0.0,
+                            "frames": 0, "samples": 0, "left_out": 0, "error": null})"));
+  EXPECT_THAT(post("/api/v1/recording/end", ""), StartsWith("HTTP/1.1 409"));
+  for (const char* wrong : {"", "{}", "[]", R"({"duration_s": "10"})", R"({"duration_s": 0})",
+                            R"({"duration_s": 1e9})", R"({"duration_s": 10, "x": 1})"}) {
+    EXPECT_THAT(post("/api/v1/recording", wrong), StartsWith("HTTP/1.1 400")) << wrong;
+  }
+  const std::string begun = post("/api/v1/recording", R"({"duration_s": 10})");
+  EXPECT_THAT(begun, StartsWith("HTTP/1.1 202"));
+  EXPECT_THAT(body_of(begun)["directory"], StartsWith(directory.path()));
+  EXPECT_EQ(body_of(begun)["asked_s"], 10);
+  EXPECT_THAT(post("/api/v1/recording", R"({"duration_s": 10})"), StartsWith("HTTP/1.1 409"));
+  for (int i = 0; i < 5; ++i) recorder.take(test::kept_frame(i, 7 + 0.1 * i));
+  const std::string ended = post("/api/v1/recording/end", "");
+  EXPECT_THAT(ended, StartsWith("HTTP/1.1 200"));
+  EXPECT_EQ(body_of(ended)["frames"], 5);
+  EXPECT_EQ(body_of(ended)["under_way"], false);
+  EXPECT_EQ(body_of(get("/api/v1/status"))["recording"], body_of(ended));
 }
 
 class HttpApiWithSceneMapTest : public HttpApiTest {

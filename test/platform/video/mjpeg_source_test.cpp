@@ -17,8 +17,8 @@
 #include <utility>
 #include <vector>
 
-#include "platform/storage/recording_writer.h"
 #include "platform/video/jpeg_decoder.h"
+#include "platform/video/recording_copy.h"
 #include "platform/video/recording_frame_source.h"
 #include "test/platform/support/eventually.h"
 #include "test/platform/support/mjpeg_server.h"
@@ -690,34 +690,33 @@ TEST(MjpegSource, KeepsABoundedNumberOfPicturesAndReportsWhenNobodyReads) {
 
 TEST(MjpegSource, CopiesThePicturesOverReconnections) {
   const TemporaryDirectory directory;
-  RecordingWriter writer;
   std::string error;
-  ASSERT_TRUE(writer.open(directory.path(), MjpegServer::kWidth, MjpegServer::kHeight, "", &error));
   MjpegServer server;
   MjpegSourceOptions options = options_for(server.url());
   options.decode = false;
-  options.copy_to = directory.path() + "/video.mkv";
   {
+    RecordingCopy copy(directory.path());
     const auto source = open_mjpeg(options);
+    ASSERT_TRUE(source->keep_stream(true));
     Frame frame;
     for (int i = 0; i < 10; ++i) {
       ASSERT_EQ(source->read(frame, kDeadline_s), ReadStatus::kOk) << source->error();
       EXPECT_EQ(frame.luma, nullptr);
       EXPECT_FALSE(frame.decode_s);
       EXPECT_EQ(frame.width, MjpegServer::kWidth);
-      ASSERT_TRUE(writer.add_frame(frame.stamp, &error)) << error;
+      ASSERT_TRUE(copy.add(frame, &error)) << error;
     }
     server.hang_up = true;
     ASSERT_TRUE(eventually([&] {
       const ReadStatus status = source->read(frame, 0);
       if (status == ReadStatus::kOk) {
-        EXPECT_TRUE(writer.add_frame(frame.stamp, &error)) << error;
+        EXPECT_TRUE(copy.add(frame, &error)) << error;
       }
       return status == ReadStatus::kDisconnected;
     }));
     server.hang_up = false;
     ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk);
-    ASSERT_TRUE(writer.add_frame(frame.stamp, &error)) << error;
+    ASSERT_TRUE(copy.add(frame, &error)) << error;
   }
   RecordingFrameSourceOptions recorded;
   recorded.directory = directory.path();
@@ -731,8 +730,8 @@ TEST(MjpegSource, CopiesThePicturesOverReconnections) {
   EXPECT_EQ(recording->missing_frames(), 0);
 }
 
-// One of another size in mid-stream cannot be in the copy, and ends neither it nor the program.
-TEST(MjpegSource, GoesOnWithACopyBehindAPictureThatDoesNotFit) {
+// One of another size in mid-stream cannot be in a recording, and ends neither it nor the program.
+TEST(MjpegSource, GivesUpAConnectionWhosePictureDoesNotFitARecording) {
   const TemporaryDirectory directory;
   RawServer server([&server](int fd) {
     if (!server.read_request(fd)) return;
@@ -746,14 +745,22 @@ TEST(MjpegSource, GoesOnWithACopyBehindAPictureThatDoesNotFit) {
     server.stay_silent(fd);
   });
   MjpegSourceOptions options = options_for(server);
-  options.copy_to = directory.path() + "/video.mkv";
+  RecordingCopy copy(directory.path());
   const auto source = open_mjpeg(options);
+  ASSERT_TRUE(source->keep_stream(true));
   Frame frame;
+  std::string error;
   ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
+  ASSERT_EQ(copy.fault_of(frame), "");
+  ASSERT_TRUE(copy.add(frame, &error)) << error;
+  ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
+  EXPECT_THAT(copy.fault_of(frame), HasSubstr("video.mkv began as mjpeg of 96x64"));
+  ASSERT_TRUE(source->refuse(copy.fault_of(frame)));
   ASSERT_EQ(read_until(*source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
   EXPECT_THAT(source->error(), HasSubstr("video.mkv began as mjpeg of 96x64"));
   ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
   EXPECT_EQ(frame.width, MjpegServer::kWidth);
+  EXPECT_EQ(copy.fault_of(frame), "");
 }
 
 TEST(MjpegSource, StopEndsAReadThatGetsNoAnswer) {

@@ -130,22 +130,20 @@ TEST(StreamCopy, StoresUncompressedLumaThatARecordingGivesBack) {
   directory.write("frames.csv", "frame,receive_time_s\n0,0.5\n1,0.51\n2,0.52\n3,0.53\n");
   const auto grey = [](int picture, int place) { return (7 * picture + place) % 256; };
   {
-    const CodecParametersPtr parameters(avcodec_parameters_alloc());
-    parameters->codec_type = AVMEDIA_TYPE_VIDEO;
-    parameters->codec_id = AV_CODEC_ID_RAWVIDEO;
-    parameters->format = AV_PIX_FMT_GRAY8;
-    parameters->codec_tag = avcodec_pix_fmt_to_codec_tag(AV_PIX_FMT_GRAY8);
     StreamCopy copy;
     for (int i = 0; i < kPictures; ++i) {
-      const PacketPtr packet(av_packet_alloc());
-      ASSERT_EQ(av_new_packet(packet.get(), kWidth * kHeight), 0);
-      packet->flags |= AV_PKT_FLAG_KEY;
+      StreamPicture picture;
+      picture.packet = make_picture_packet(kWidth * kHeight);
+      ASSERT_TRUE(picture.packet);
       for (int place = 0; place < kWidth * kHeight; ++place) {
-        packet->data[place] = static_cast<std::uint8_t>(grey(i, place));
+        picture.packet->data[place] = static_cast<std::uint8_t>(grey(i, place));
       }
+      picture.parameters = picture_parameters(AV_CODEC_ID_RAWVIDEO);
+      picture.width = kWidth;
+      picture.height = kHeight;
+      EXPECT_EQ(copy.fault_of(picture), "");
       std::string error;
-      ASSERT_TRUE(copy.add(directory.path() + "/video.mkv", *parameters, kWidth, kHeight, *packet,
-                           0.5 + 0.01 * i, &error))
+      ASSERT_TRUE(copy.add(directory.path() + "/video.mkv", picture, 0.5 + 0.01 * i, &error))
           << error;
     }
   }
