@@ -1,6 +1,7 @@
 #pragma once
-// Last stage of calibrate(): the adjusted state as a calibration in the model's units, with its
-// covariance, residuals, landmarks, frames and counts.
+// Sixth stage of calibrate(): the adjusted state as a calibration in the model's units, with its
+// covariance, residuals, landmarks, frames and counts. The last stage, judge() (sufficiency.h),
+// decides whether it is good enough.
 // Two corrections are made here. The variance of the stamps, which motion does not reduce, is added
 // to the clock offset's; if the offset has a prior, this moves it and lessens that variance. The
 // drift between the clocks is split by the variances of their periods: the image clock's part

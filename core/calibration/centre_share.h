@@ -22,13 +22,13 @@ struct CentreShare {
   Matrix<double, n, 2> slope = Matrix<double, n, 2>::Zero();  // S
   Matrix2<double> covariance = Matrix2<double>::Zero();       // V, px^2
 
-  // False: the centre is exact.
+  // False: the centre is exact in u or v, or V was not positive definite.
   [[nodiscard]] bool exists() const { return covariance.diagonal().minCoeff() > 0; }
   // S V S^T.
   [[nodiscard]] Matrix<double, n, n> part() const { return slope * covariance * slope.transpose(); }
 };
 
-// Does not exist if the centre is exact, or V is not positive definite.
+// Does not exist if the centre is exact in u or v, or V is not positive definite.
 template <int n>
 [[nodiscard]] CentreShare<n> centre_share(const Matrix<double, n, n>& covariance) {
   constexpr int c = camera_column::kCentreU;

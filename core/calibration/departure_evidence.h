@@ -5,7 +5,8 @@
 //                                                      semidefinite): s and N of departure_score.h
 //   c ~ N(0, K)      log evidence = g^T P g / 2 - log det(I + K S) / 2,  P = (S + K^-1)^-1 = cov(c)
 // K is made of parts, each present or not:
-//   curve    A^2 exp(-(i - j)^2 / (2 L^2)) on knots i, j: any smooth error
+//   curve    A^2 exp(-(i - j)^2 / (2 L^2)) on knots i, j: any smooth error. closed: i - j is the
+//            chord of a circle on which the knots lie
 //   ripple   A^2 cos(2 pi (i - j) / L) on knots: a sine of any phase, as a gear's
 //   number   A^2
 // The evidence chooses parts, A and L (type-II likelihood). K may be singular, so its root R is
@@ -26,7 +27,8 @@ struct DeparturePart {
   bool closed = false;     // curve: the last knot's neighbour is the first
   double unit = 1;         // in the unit of c: the search for A begins here; least A: 1e-3 of it
   double largest = 1e3;    // in the unit of c: the largest A; neither limit holds for a number
-  int rival = -1;          // index of a part that is never present together with this one; -1: none
+  // Index of a part that is never present together with this one; each names the other. -1: none.
+  int rival = -1;
 };
 
 // What was chosen for one part.

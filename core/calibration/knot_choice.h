@@ -2,9 +2,9 @@
 // choose_knots(): where the trajectory needs more knots. A score test: by how much would the sum of
 // squares fall if every segment were halved (one Gauss-Newton step of the spline alone)? A segment
 // has two new unknowns: its gain is a chi-square of two degrees of freedom under pure noise.
-// Splits a segment whose own gain is beyond chance among all segments (1 %). If it and its
-// neighbours, 16 segments, together gain 4 standard deviations more than noise gives (twice as
-// much), a gain above its expectation is enough. Both halves need two frames or samples.
+// Splits a segment whose own gain is beyond chance among all segments (1 %). A gain above its
+// expectation, 2, is enough where it and its neighbours, 16 segments, gain 4 standard deviations
+// more than noise gives: above 64, twice the expectation. Both halves need two frames or samples.
 // Derivation: docs/calibration.md. Allocates.
 
 #include <vector>

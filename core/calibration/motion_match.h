@@ -25,10 +25,10 @@ struct ImageMotion {
 // Neighbours in a chain share three landmarks or more.
 [[nodiscard]] std::vector<ImageMotion> image_motion(const AdjustmentData& data, double baseline_s);
 
-// By the motions about one axis alone. 0: it did not move.
+// By the motions about one axis alone.
 struct AxisMatch {
-  double focal_length = 0;  // px
-  double sigma = 0;         // px, by what is left
+  double focal_length = 0;  // px; 0: it did not move; negative: it moved against the telemetry
+  double sigma = 0;         // px, by the image motion that focal_length does not explain
 };
 
 struct MotionMatch {
@@ -42,8 +42,9 @@ struct MotionMatch {
   double half_range_s = 0;  // of the search
 };
 
-// The best shift within half_range_s of centre_s, to 0.1 ms. telemetry: measured angles over the
-// telemetry clock. signs: factors of pan and tilt; -1 reverses an axis.
+// The best shift within half_range_s of centre_s, to 0.1 ms; with at_edge it may lie up to 0.03 s
+// beyond. telemetry: measured angles over the telemetry clock. signs: factors of pan and tilt; -1
+// reverses an axis.
 [[nodiscard]] MotionMatch match_motion(const std::vector<ImageMotion>& motion,
                                        const TrajectorySpline& telemetry, double centre_s,
                                        double half_range_s, const Vector2<double>& signs = {1, 1});

@@ -44,8 +44,8 @@ struct MovementData {
 // second dwell, log f of the control points between, n. Times on the image clock.
 class MovementAdjustment {
  public:
-  // curve: not empty; start values, distortion, centre and shared parameters. It must outlive this
-  // object, and must not change.
+  // curve: not empty; gives start values, distortion, centre and shared parameters. The curve must
+  // outlive this object, and must not change.
   MovementAdjustment(MovementData data, const ZoomCurve& curve);
 
   // False and one line in *error: no landmark has a projection, too few tracks agree, or something
@@ -67,9 +67,11 @@ class MovementAdjustment {
   }
   // d log f / d unknowns.
   [[nodiscard]] Eigen::VectorXd log_f_row(double time_s) const;
-  // Covariance of the unknowns; enlarged if the residuals exceed their sigmas.
+  // Covariance of the unknowns, enlarged if the residuals exceed their sigmas. Includes a weak prior
+  // of each log f, of sigma 0.5.
   [[nodiscard]] const Eigen::MatrixXd& covariance() const { return covariance_; }
-  // RMS of all residuals over their sigmas, redundancy accounted for.
+  // RMS of the residuals of observations and telemetry over their sigmas, by their redundancy. n is
+  // not among them; a residual of telemetry counts as at most 3 sigmas.
   [[nodiscard]] double pixel_sigma_ratio() const { return pixel_sigma_ratio_; }
 
  private:

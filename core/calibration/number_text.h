@@ -19,10 +19,10 @@ namespace alidade {
 // With a fixed number of decimals.
 [[nodiscard]] std::string rounded_text(double value, int decimals);
 
-// An estimate and its standard deviation: two digits of sigma, and the value to the same decimals.
-// sigma 0: the value is exact and gets up to 10 digits.
+// The value alone, with the decimals (0 to 12) that show two digits of sigma. sigma 0: the value is
+// exact and gets up to 10 digits.
 [[nodiscard]] std::string value_text(double value, double sigma);
-// sigma with two digits; "exact" if it is 0.
+// sigma with as many decimals; below 1e-4 as "1.2e-05". "exact" if it is 0.
 [[nodiscard]] std::string sigma_text(double sigma);
 // Both: "940.12 +- 0.34 px", or "940 px, exact". unit may be empty.
 [[nodiscard]] std::string estimate_text(double value, double sigma, const std::string& unit);

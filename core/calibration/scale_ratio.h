@@ -21,12 +21,13 @@ struct ScaleRatio {
 [[nodiscard]] ScaleRatio scale_ratio(const Mechanics<double>& mechanics,
                                      const GlobalMatrix& covariance);
 
-// To some percent, where nothing can be adjusted. Empty: the scales agree to within 4 % or 4 sigmas,
-// or an axis did not move. expected: the ratio as it is known before.
+// To some percent, where nothing can be adjusted. Empty: the scales agree to within 4 % or 4 sigmas
+// (the larger), or an axis did not move, or moved against its telemetry. expected: the ratio as it
+// is known before.
 [[nodiscard]] std::optional<ScaleRatio> rough_scale_ratio(const MotionMatch& match,
                                                           double expected);
 
-// "pan and tilt differ in scale by a factor of 1.059 +- 0.002: by the pictures, ..."
+// "pan and tilt differ in scale by a factor of 1.0590 +- 0.0020: by the pictures, ..."
 [[nodiscard]] std::string describe(const ScaleRatio& found);
 
 }  // namespace alidade::internal

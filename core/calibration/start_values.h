@@ -4,7 +4,8 @@
 //                  offset and focal length, or says why there are none
 //   start_values   leaves out what lies outside the other stream's time span. Sets the trajectory
 //                  from telemetry, landmarks as medians of their observed directions, and priors
-//                  (adjustment_priors.h). A focal length that is known exactly is taken
+//                  (adjustment_priors.h). A focal length with a prior of sigma 0 replaces the one
+//                  that was found
 // Allocates.
 
 #include <string>
@@ -42,10 +43,11 @@ struct StartValues {
   std::string doubt;  // ask_for_degrees(): for the message if the adjustment does not converge
 };
 
-// match: of find_motion(), ok. Removes observations, landmarks and telemetry samples outside the
-// other stream's span from *selected, and counts them in *excluded. Refuses (bad input) if fewer
-// than kMinLandmarks landmarks are left, or if fit_telemetry() has no result for the samples that
-// are left. *start is incomplete after a refusal.
+// match: of find_motion(), ok. Removes observations, landmarks and samples outside the other
+// stream's span from *selected; telemetry up to 0.25 s beyond the video stays. Counts frames,
+// samples and landmarks left with one observation in *excluded. Refuses (bad input) if fewer than
+// kMinLandmarks landmarks are left, or if fit_telemetry() has no result for the samples that are
+// left. *start is incomplete after a refusal.
 [[nodiscard]] StageStatus start_values(const CalibrationInput& input,
                                        const CalibrationOptions& options,
                                        const RecordingClocks& clocks, const MotionMatch& match,

@@ -1,7 +1,7 @@
 #pragma once
 // TrajectorySpline: pan and tilt over time as a CubicSpline. Its control points are (pan, tilt) in
-// rad, not wrapped; rates in rad/s. Usually true angles on the image clock; where telemetry is
-// fitted (fit_telemetry()), measured angles.
+// rad, not wrapped; rates in rad/s. Usually true angles on the image clock. fit_telemetry() makes
+// one of measured angles, on the telemetry clock minus its shift_s.
 
 #include "core/model/angle.h"
 #include "core/model/cubic_spline.h"

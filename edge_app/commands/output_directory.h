@@ -11,8 +11,8 @@
 
 namespace alidade {
 
-// given: the argument of -o. If it is empty: `alidade` in the recording's directory, or beside the
-// recording if the recording is a file.
+// given: the argument of -o. If it is empty: `alidade` inside the recording if that is a directory,
+// else beside it.
 [[nodiscard]] std::string output_path(const std::string& given, const std::string& recording);
 
 // A lock on an output file, held while a command works. Another command that would write the file

@@ -17,10 +17,11 @@ struct MqttOptions {
   std::string password;
   std::string client_id;  // empty: random
   std::string prefix = "alidade";
-  int qos = 1;
-  int keep_alive_s = 15;      // s; after 1.5 times this without a sign the broker says `offline`
-  double timeout_s = 5;       // s, from an attempt to the broker's answer
-  double max_backoff_s = 30;  // s, longest pause between two attempts
+  int qos = 1;  // MQTT's quality of service, 0 to 2
+  // s, 5 to 3600; after 1.5 times this without a sign the broker says `offline`.
+  int keep_alive_s = 15;
+  double timeout_s = 5;            // s, from an attempt to the broker's answer
+  double max_backoff_s = 30;       // s, longest pause between two attempts
   double orientation_rate_hz = 1;  // at most; 0: orientation is not published
 
   // For messages: mqtts://broker:8883.

@@ -1,9 +1,10 @@
 #pragma once
-// Why a session gave no calibration, and what would help. If pictures were sent again while the
-// camera turned, it is not known when the other pictures were taken. If most pictures were never
-// looked at, as on an overloaded machine, too few were seen. In both cases the reason says so, and
-// the mismatch between telemetry and motion, which is only a consequence, is not reported. Pure;
-// allocates.
+// Why a session gave no calibration, and what would help. If more than 1 % of the pictures were
+// sent again while the camera turned, nobody knows when the others were taken: that is the reason,
+// in place of a mismatch with telemetry, no convergence or a failed check. Else, if fewer than half
+// of the pictures were looked at, as on an overloaded machine, that takes the place of a mismatch
+// and is added to no convergence, a failed check or a weak result. Other refusals, such as too
+// little motion, stay as they are. Pure; allocates.
 
 #include <cstddef>
 #include <string>
@@ -15,7 +16,8 @@ namespace alidade {
 
 struct CalibrationRefusal {
   CalibrationNeed need = CalibrationNeed::kTime;
-  std::string why;  // begins with " (" or ": ", to follow "not calibrated yet"
+  // Begins with " (" or ": ", to follow "not calibrated yet" or "no fresh calibration yet".
+  std::string why;
 };
 
 // checked: must have a refusal. frames: the number of frames in its session. repeated_share: share

@@ -26,7 +26,8 @@ class Watchdog {
   Watchdog(const Watchdog&) = delete;
   Watchdog& operator=(const Watchdog&) = delete;
 
-  // To be called when the watched call has returned. True if the deadline came first.
+  // Call it when the watched call has returned. True if the deadline came first. It waits while
+  // `bark` runs, so `bark` must not call it.
   [[nodiscard]] bool stand_down() {
     {
       const std::lock_guard<std::mutex> lock(mutex_);

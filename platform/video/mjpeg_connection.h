@@ -32,6 +32,8 @@ class MjpegConnection {
   // False: kNoCurl.
   [[nodiscard]] bool is_ready() const { return multi_ != nullptr; }
   // One connection from start to end. ending(): asked again and again; true: give up (kStopped).
+  // kFailed: the login was refused before any picture came. kDisconnected: any other end. Both set
+  // *error, one line.
   [[nodiscard]] ReadStatus receive(const std::function<bool()>& ending, std::string* error);
   // Wakes receive(), which then asks ending().
   void interrupt();

@@ -1,8 +1,9 @@
 #pragma once
 // ReceivingThread: common to all sources that receive over a network: a thread that reconnects with
 // back-off, and a bounded queue of pictures and reports of lost connections for read(). Picture
-// need only be movable. If the reader is too slow, the oldest pictures are dropped and counted. Of
-// consecutive reports only the last is kept. So memory is bounded even if read() is not called.
+// must be default-constructible and movable. If the reader is too slow, the oldest pictures are
+// dropped and counted. Of consecutive reports only the last is kept. So memory is bounded even if
+// read() is not called.
 
 #include <algorithm>
 #include <atomic>

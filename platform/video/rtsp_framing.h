@@ -3,7 +3,7 @@
 //   '$' channel length(16 bits) packet      RTP or RTCP: version 2, 8 bytes or more; or empty
 //   "RTSP/1.0 ..." or "METHOD ..."          a message: printable head, empty line, body by
 //                                           Content-Length. Before set_channels() the head may
-//                                           have letters beyond ASCII
+//                                           have any byte but NUL
 // Line ends between packets and messages are ignored. Anything else is garbage, skipped byte by
 // byte up to a possible packet or message. A packet after garbage must be on one of the known
 // channels. No I/O; each byte is examined a few times; memory is bounded. One thread at a time.
@@ -37,7 +37,8 @@ class RtspFraming {
     packets_ = true;
   }
 
-  // room(): where to write bytes. came(): how many were written.
+  // room(): where to write bytes. came(): how many were written, and when (s). Then next() is to be
+  // called until it returns kNone: else arrival_s is of later bytes, and room() may become empty.
   [[nodiscard]] std::pair<char*, std::size_t> room();
   void came(std::size_t bytes, double arrival_s);
 
@@ -45,7 +46,8 @@ class RtspFraming {
 
   // Bytes that belong to no packet and no message.
   [[nodiscard]] std::int64_t garbage() const { return garbage_; }
-  // True if some garbage started as a message longer than kMaxMessage.
+  // True if some garbage started as a message longer than kMaxMessage, or with a head of more than
+  // 16 KiB.
   [[nodiscard]] bool had_long_message() const { return had_long_message_; }
   // True after more than kMaxGarbage bytes of garbage in sequence: this is not RTSP, and parsing
   // has stopped.
