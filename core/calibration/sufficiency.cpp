@@ -112,10 +112,10 @@ void describe_weakest(CalibrationResult* result) {
 
 // In the unit in which it is easily judged.
 std::string known_to(const ParameterGoal& goal, const MotionExtent& motion) {
-  const bool of_radius = goal.parameter == Parameter::kRadialDistortion;
+  const char* const of_radius = is_distortion(goal.parameter) ? " of the radius" : "";
   std::string out = goal.name + text(" known to %.1f ", goal.easy * *goal.sigma) + goal.easy_unit +
-                    (of_radius ? " of the radius" : "") + " only, " +
-                    text("%g ", goal.easy * goal.wanted) + goal.easy_unit + " are needed";
+                    of_radius + " only, " + text("%g ", goal.easy * goal.wanted) + goal.easy_unit +
+                    " are needed";
   if (goal.parameter == Parameter::kClockOffset)
     out += text(" (largest rate %.3f rad/s)", motion.largest_rate.norm());
   return out;

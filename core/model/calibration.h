@@ -39,6 +39,11 @@ inline constexpr int kParameterCount = static_cast<int>(Parameter::kCount);
 [[nodiscard]] constexpr Parameter distortion_parameter(int term) {
   return static_cast<Parameter>(camera_column::kDistortion + term);
 }
+// Whether it is one of them.
+[[nodiscard]] constexpr bool is_distortion(Parameter parameter) {
+  return index(parameter) >= camera_column::kDistortion &&
+         index(parameter) < camera_column::kDistortion + kDistortionCount;
+}
 
 // The name in files and reports.
 [[nodiscard]] constexpr const char* to_string(Parameter parameter) {

@@ -40,9 +40,8 @@ void add_sigma(ReportPage& page, const ParameterGoal& goal) {
   const double sigma = goal.easy * *goal.sigma;
   const double limit = goal.easy * goal.wanted;
   const char* const of_what = goal.parameter == Parameter::kLineDelay ? " for the whole picture"
-                              : goal.parameter == Parameter::kRadialDistortion
-                                  ? " of the radius in the corner"
-                                  : "";
+                              : is_distortion(goal.parameter) ? " of the radius in the corner"
+                                                              : "";
   const bool holds = sigma <= limit;
   add(page, holds ? "good" : "weak",
       fmt::format("{} known to {} {}", goal.name, sigma_text(sigma), goal.easy_unit),

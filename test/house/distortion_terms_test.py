@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Is each term of the camera's distortion where no compiler looks for it? (core/model/lens/README.md)"""
+"""Is each term of the camera's distortion where no compiler looks for it, and is a parameter asked whether it is a term, not whether it is
+the first one? (core/model/lens/README.md)"""
 import pathlib
 import re
 import unittest
@@ -53,6 +54,15 @@ class DistortionTerms(unittest.TestCase):
                    for parts, wanted in ((PARTS, names), (PARTS_BY_PARAMETER, enumerators)) for file, begin, end in parts for name in wanted
                    if not re.search(rf"\b{name}\b", part(file, begin, end))]
         self.assertFalse(missing, "\n".join(missing))
+
+    def test_are_not_told_by_the_first_one(self):
+        """A comparison with it compiles with further terms, and leaves them out."""
+        sources = sorted(path for room in ("core", "platform", "edge_app", "test") for path in (TOP / room).rglob("*")
+                         if path.suffix in (".h", ".cpp"))
+        self.assertGreater(len(sources), 700)
+        first = re.compile(r"[=!]=\s*(?:index\()?Parameter::kRadialDistortion|Parameter::kRadialDistortion\)?\s*[=!]=")
+        wrong = [str(path.relative_to(TOP)) for path in sources if first.search(path.read_text(encoding="utf-8"))]
+        self.assertFalse(wrong, "is_distortion() (core/model/calibration.h) instead: " + ", ".join(wrong))
 
 
 if __name__ == "__main__":

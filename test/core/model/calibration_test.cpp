@@ -25,5 +25,14 @@ TEST(Parameter, EachTermOfTheDistortionHasTheNameOfTheKind) {
   }
 }
 
+TEST(Parameter, IsOfTheDistortionIfItIsOneOfItsTerms) {
+  int terms = 0;
+  for (int i = 0; i < kParameterCount; ++i)
+    terms += is_distortion(static_cast<Parameter>(i)) ? 1 : 0;
+  EXPECT_EQ(terms, kDistortionCount);
+  for (int term = 0; term < kDistortionCount; ++term)
+    EXPECT_TRUE(is_distortion(distortion_parameter(term))) << term;
+}
+
 }  // namespace
 }  // namespace alidade

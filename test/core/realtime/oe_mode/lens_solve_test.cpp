@@ -414,7 +414,7 @@ TEST(LensSolve, FollowsTheCalibrationAsItsSensitivitySays) {
       of_lens[j] = frame.normal(1e-3);
       for (int i = 0; i < 4; ++i) of_telemetry(i, j) = frame.normal(1e-4);
       for (FoundLandmark& f : frame.landmarks) {
-        if (j != kRowOfF && j != index(Parameter::kRadialDistortion))
+        if (j != kRowOfF && !is_distortion(static_cast<Parameter>(j)))
           f.sensitivity.col(j) = Vector2<double>(frame.normal(0.1), frame.normal(0.1));
       }
     }
@@ -435,9 +435,9 @@ TEST(LensSolve, FollowsTheCalibrationAsItsSensitivitySays) {
       frame.prior.telemetry -= step * of_telemetry.col(j);
       return out;
     };
-    // But for f and k, whose effect phi takes over.
+    // But for f and the distortion, whose effect phi takes over.
     for (int j = 0; j < kParameterCount; ++j) {
-      if (j == kRowOfF || j == index(Parameter::kRadialDistortion)) continue;
+      if (j == kRowOfF || is_distortion(static_cast<Parameter>(j))) continue;
       constexpr double kStep = 1e-3;
       const SolvedMotion more = moved(j, kStep);
       const SolvedMotion less = moved(j, -kStep);
