@@ -1,8 +1,8 @@
 #pragma once
-// BuiltInDetectors: runs the user's network (core/detection/network_detector.h), the person
-// detector (person_detector.h) and the motion detector (motion_detector.h), in this order, on the
-// pictures of a DetectorTap. All boxes of a frame go to the TargetFeed together, as if a client had
-// sent them. If no detector could judge the picture, nothing is sent.
+// BuiltInDetectors: runs on the pictures of a DetectorTap, in this order, the detectors of
+// core/detection that are configured: onnx, the user's network (network_detector.h), people
+// (person_detector.h) and motion (motion_detector.h). All boxes of a frame go to the TargetFeed
+// together, as if a client had sent them. If no detector could judge the picture, nothing is sent.
 // Scores become 0 to 1, but are no probabilities. The score of motion is its share of the largest
 // possible score. The score of a person is 1 / (1 + e^-s), s the distance from the SVM's plane. A
 // box whose middle lies in a box of an earlier detector is taken for the same thing and left out,

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Lists that nothing else compares: is each source built, does each type of link keep the contract, is each scheme's name looked up, has
 each section and each kind that a configuration can name its line in the test of the examples, and each kind and key a seed of the fuzzer,
-is each value and route of the API described and given what it tells, has the page a sentence for all that a calibration does and needs?"""
+is each kind of detector in the prose that lists them, is each value and route of the API described and given what it tells, has the page
+a sentence for all that a calibration does and needs?"""
 import pathlib
 import re
 import unittest
@@ -80,6 +81,33 @@ class PanTiltTypes(unittest.TestCase):
                 self.assertTrue(any(name.startswith(one) for name in names), f"PanTiltSourceContract has no case whose name begins with {one}")
 
 
+def detector_kinds():
+    """In the order of their rows."""
+    return re.findall(r'\{DetectorKind::k\w+, "(\w+)"', read("edge_app/tracking/detector_kinds.h"))
+
+
+class DetectorKinds(unittest.TestCase):
+    def setUp(self):
+        self.kinds = detector_kinds()
+        self.assertGreater(len(self.kinds), 2)
+
+    def test_are_in_prose(self):
+        headers = [(path, read(path).split("#include")[0]) for path in ("edge_app/tracking/built_in_detectors.h",
+                                                                        "edge_app/config/detectors_config.h")]
+        rows = [(path, "".join(line for line in read(path).splitlines() if line.startswith(begin))) for path, begin in
+                (("edge_app/tracking/README.md", "| `built_in_detectors.h` |"), ("ARCHITECTURE.md", "| `core/detection/` |"),
+                 ("core/README.md", "| [`detection/`]"), ("edge_app/config/README.md", "| built-in detectors"))]
+        for path, text in headers + rows:
+            for kind in self.kinds:
+                self.assertRegex(text, rf"\b{kind}\b", f"{path}: where it lists the detectors, no {kind}")
+
+    def test_are_in_the_order_in_which_they_look(self):
+        """The last row looks first."""
+        text = read("edge_app/tracking/built_in_detectors.h").split("#include")[0]
+        told = re.findall(rf"\b({'|'.join(self.kinds)})\b", text)
+        self.assertEqual(list(dict.fromkeys(told)), self.kinds[::-1], "edge_app/tracking/built_in_detectors.h, first lines")
+
+
 WHERE_SECTIONS = "test/edge_app/config/config_test.cpp, `sections` of TheExamplesShowEveryKey"
 SEEDS = "test/fuzz/corpus/config"
 
@@ -138,7 +166,7 @@ class ConfiguredKinds(unittest.TestCase):
         self.kinds = {
             "video": re.findall(r'\{VideoConfig::Type::k\w+, "(\w+)"', read("edge_app/config/video_config.cpp")),
             "pan_tilt": pan_tilt_types() + re.findall(r'\{HeadType::k\w+, "(\w+)"', read("platform/pan_tilt/heads.h")),
-            "detectors": re.findall(r'\{DetectorKind::k\w+, "(\w+)"', read("edge_app/tracking/detector_kinds.h"))}
+            "detectors": detector_kinds()}
         for section, kinds in self.kinds.items():
             self.assertGreater(len(kinds), 2, section)
 
