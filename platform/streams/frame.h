@@ -24,7 +24,8 @@ enum class StampedAt : std::uint8_t {
   kFrameEnd        // the end of the whole frame's readout, as the driver says; likewise
 };
 
-// When and in which order a frame came. Fixed size; crosses queues by value.
+// What a source tells of a frame: when and in which order it came. Fixed size; crosses queues by
+// value.
 struct FrameStamp {
   std::int64_t frame = 0;  // 0, 1, 2, ...: count of the frames that this source delivered
   // s, host CLOCK_MONOTONIC: the moment that stamped_at names. The arrival is that of the frame's
