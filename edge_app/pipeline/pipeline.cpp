@@ -243,7 +243,7 @@ void Pipeline::feed_calibration() {
   for (FeedFrame frame; stage_.pop(frame);) {
     calibration_->add(frame.tracks);
     if (frame.slot != kNoImageSlot) {
-      calibration_->add_keyframe(frame.image);
+      calibration_->add_keyframe(frame.tracks.stamp.frame, frame.image);
       stage_.give_back(frame.slot);
     } else if (calibration_->wants_keyframe()) {
       stage_.want_image();

@@ -57,6 +57,10 @@ class CalibrationSession {
   void add_keyframe(const ImageView& image);
 
   [[nodiscard]] bool empty() const { return frames_.empty(); }
+  // The number of the frame added last; empty: there is none.
+  [[nodiscard]] std::optional<std::int64_t> newest_frame() const {
+    return frames_.empty() ? std::nullopt : std::optional(frames_.back().stamp.frame);
+  }
   [[nodiscard]] std::size_t frames() const { return frames_.size(); }
   // s, receive times of the frames: newest minus oldest, and the newest. 0 without frames.
   [[nodiscard]] double span_s() const;

@@ -340,9 +340,9 @@ bool SelfCalibration::wants_keyframe() const {
   return options_.automatic && session_.wants_keyframe(publication_.calibration().camera);
 }
 
-void SelfCalibration::add_keyframe(const ImageView& image) {
+void SelfCalibration::add_keyframe(std::int64_t frame, const ImageView& image) {
   const Camera<double>& camera = options_.data_sheet.camera;
-  if (session_.empty() || !image.valid() || image.width != camera.width ||
+  if (session_.newest_frame() != frame || !image.valid() || image.width != camera.width ||
       image.height != camera.height) {
     return;
   }

@@ -63,7 +63,9 @@ class SelfCalibration {
   void add(const FrameTracks& tracks);
   // True: the image of the frame added last is wanted as a keyframe; see add_keyframe().
   [[nodiscard]] bool wants_keyframe() const;
-  void add_keyframe(const ImageView& image);  // copies the image
+  // Copies the image. frame: its number. Nothing is kept of a frame that the session did not take,
+  // such as one of an unknown time.
+  void add_keyframe(std::int64_t frame, const ImageView& image);
   void add(const PanTiltSample& sample);
   void video_lost() { streams_.lose_video(); }          // the next frame ends that state
   void telemetry_lost() { streams_.lose_telemetry(); }  // the next sample ends that state

@@ -90,7 +90,8 @@ void EnduranceConsumer::feed(const Feed& feed) {
     const auto& frame = std::get<FeedFrame>(feed);
     calibrating_->add(frame.tracks);
     if (!frame.image.empty()) {
-      calibrating_->add_keyframe({frame.image.data(), width_, height_, width_});
+      calibrating_->add_keyframe(frame.tracks.stamp.frame,
+                                 {frame.image.data(), width_, height_, width_});
     } else if (calibrating_->wants_keyframe()) {
       image_wanted_ = true;
     }

@@ -82,7 +82,8 @@ std::unique_ptr<SelfCalibration> Heard::told() const {
     for (int i = 0; i < kSamplesPerFrame; ++i)
       calibration->add(samples_[static_cast<std::size_t>(kSamplesPerFrame * k + i)]);
     calibration->add(tracks_[static_cast<std::size_t>(k)]);
-    if (calibration->wants_keyframe()) calibration->add_keyframe(camera_.view(k));
+    if (calibration->wants_keyframe())
+      calibration->add_keyframe(tracks_[static_cast<std::size_t>(k)].stamp.frame, camera_.view(k));
   }
   return calibration;
 }

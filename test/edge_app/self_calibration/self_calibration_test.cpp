@@ -758,9 +758,16 @@ TEST(SelfCalibration, TakesKeyframesWhereItHasNone) {
     sample.pan_rad = i;  // far apart, with a field of view of half a radian
     calibration.add(sample);
     tracks.stamp.frame = i;
+    tracks.time_is_of_use = true;
     calibration.add(tracks);
     EXPECT_TRUE(calibration.wants_keyframe()) << i;
-    calibration.add_keyframe(image);
+    // A frame that is of no use to the session was lent its image all the same.
+    tracks.stamp.frame = 100 + i;
+    tracks.time_is_of_use = false;
+    calibration.add(tracks);
+    calibration.add_keyframe(tracks.stamp.frame, image);
+    EXPECT_TRUE(calibration.wants_keyframe()) << "an image of another frame is not this one's";
+    calibration.add_keyframe(i, image);
     EXPECT_FALSE(calibration.wants_keyframe()) << "one of this view is enough";
   }
 }
