@@ -114,14 +114,14 @@ std::unique_ptr<MqttPublisher> make_mqtt(const Config& config, LiveTargets* targ
 }
 
 // Null if no directory for recordings is configured.
-std::unique_ptr<LiveRecorder> make_recorder(const Config& config, FrameSource* video) {
+std::unique_ptr<LiveRecorder> make_recorder(const Config& config) {
   if (config.output.recordings.empty()) return nullptr;
   LiveRecorderOptions options;
   options.parent = config.output.recordings;
   options.write_side_files = [config](const std::string& directory, std::string* error) {
     return write_side_files(config, directory, error);
   };
-  return std::make_unique<LiveRecorder>(*video, std::move(options));
+  return std::make_unique<LiveRecorder>(std::move(options));
 }
 
 // Waits for a signal, the end of the pipeline or the end of the duration. Gives back which it was,
@@ -197,7 +197,7 @@ int run_live(const RunOptions& options) {
   const auto scene = load_scene(config, calibration);
   std::optional<SceneTap> scene_tap;
   if (scene) of_pipeline.scene = &scene_tap.emplace(*scene, scene_tap_options(config.scene_map));
-  const std::unique_ptr<LiveRecorder> recorder = make_recorder(config, video.get());
+  const std::unique_ptr<LiveRecorder> recorder = make_recorder(config);
   of_pipeline.recorder = recorder.get();
   Pipeline pipeline(*video, *pan_tilt, sinks, calibrating.calibration.get(), of_pipeline);
   HttpApiSources sources;

@@ -157,10 +157,19 @@ bool Pipeline::push(const Frame& frame) {
     message.image = {frame.luma, frame.width, frame.height, frame.stride};
     free_slots_.pop_back();
     images_[static_cast<std::size_t>(message.slot)] = frame;
+    message.colour = colour_of(frame);
   }
   message.decoded_s = monotonic_now_s();
   if (!stage_.push(message) && message.slot != kNoImageSlot) free_slots_.push_back(message.slot);
   return true;
+}
+
+// The stream's own pictures are for a recording, and for the colour of live pictures.
+void Pipeline::keep_stream_if_wanted() {
+  const bool wanted = (options_.recorder != nullptr && options_.recorder->takes()) ||
+                      (options_.tap != nullptr && options_.tap->is_watched());
+  if (wanted == std::exchange(keeps_stream_, wanted)) return;
+  static_cast<void>(video_.keep_stream(wanted));
 }
 
 // Sets the calling thread's scheduling. What is not permitted was reported by the real-time thread,
@@ -190,6 +199,7 @@ void Pipeline::capture() {
     decodes = true;
     const bool goes_on = push(frame);
     if (options_.recorder != nullptr) options_.recorder->take(frame);
+    keep_stream_if_wanted();
     return goes_on;
   };
   const auto on_loss = [this](double now_s) {

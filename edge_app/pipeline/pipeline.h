@@ -133,6 +133,7 @@ class Pipeline {
   void count(const OutputMessage& message);
   void account_way(const OutputMessage& message, double written_s);
   bool push(const Frame& frame);
+  void keep_stream_if_wanted();
   [[nodiscard]] std::string size_fault(const Frame& frame) const;
   void fail(const std::string& error);
   void finish();
@@ -144,6 +145,7 @@ class Pipeline {
   PipelineOptions options_;
   RealtimeStage stage_;
   bool interlaced_logged_ = false;  // capture thread
+  bool keeps_stream_ = false;       // capture thread
   LinkWatch video_watch_;
   LinkWatch pan_tilt_watch_;
   std::vector<Frame> images_;            // capture thread: by slot, those still in use

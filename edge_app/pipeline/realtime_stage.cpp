@@ -149,6 +149,7 @@ void RealtimeStage::tap(const VideoMessage& message, bool* lent) {
   tapped_frame_.frame = message.stamp.frame;
   tapped_frame_.image = message.image;
   tapped_frame_.slot = message.slot;
+  tapped_frame_.colour = message.colour;
   step_.get_landmarks(&tapped_frame_.landmarks);
   *lent = tap_->push(tapped_frame_);
 }

@@ -37,6 +37,7 @@ struct VideoMessage {
   FrameStamp stamp;  // kFrame
   ImageView image;   // kFrame; not valid() if images are not used
   ImageSlot slot = kNoImageSlot;
+  ImageColour colour;    // of image
   double decoded_s = 0;  // s, host time at the push of the frame
   double time_s = 0;     // s, kLost: host time of the news
 };

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "edge_app/taps/small_image.h"
+#include "platform/system/clock.h"
 
 namespace alidade {
 
@@ -14,6 +14,7 @@ ImageTap::ImageTap(std::chrono::milliseconds interval) : interval_(interval) {
 }
 
 std::shared_ptr<const LiveImage> ImageTap::ask(std::chrono::milliseconds patience) {
+  asked_s_ = monotonic_now_s();
   std::unique_lock<std::mutex> lock(mutex_);
   const Clock::time_point asked_at = Clock::now();
   const auto fresh = [&] { return !images_.empty() && newest_at_ + interval_ > asked_at; };
@@ -23,6 +24,12 @@ std::shared_ptr<const LiveImage> ImageTap::ask(std::chrono::milliseconds patienc
   }
   made_.wait_for(lock, patience, [&] { return closed_ || fresh(); });
   return !closed_ && fresh() ? images_.back() : nullptr;
+}
+
+bool ImageTap::is_watched() const {
+  constexpr double kWatches_s = 5;
+  const double asked_s = asked_s_;
+  return asked_s >= 0 && monotonic_now_s() - asked_s < kWatches_s;
 }
 
 std::shared_ptr<const LiveImage> ImageTap::of_frame(std::int64_t frame) const {
@@ -68,7 +75,7 @@ void ImageTap::make(const TappedFrame& frame) {
   image->frame = frame.frame;
   image->width = frame.image.width;
   image->height = frame.image.height;
-  image->jpeg = small_jpeg(frame.image, kMaxWidth);
+  image->jpeg = small_jpeg(frame.image, kMaxWidth, frame.colour);
   image->landmarks = frame.landmarks;
   const std::lock_guard<std::mutex> lock(mutex_);
   if (images_.size() == kKept) images_.pop_front();

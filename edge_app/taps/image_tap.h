@@ -25,6 +25,7 @@
 #include "core/realtime/image/image_view.h"
 #include "edge_app/step/frame_landmarks.h"
 #include "edge_app/taps/image_slot.h"
+#include "edge_app/taps/small_image.h"
 #include "platform/system/semaphore.h"
 
 namespace alidade {
@@ -34,6 +35,7 @@ struct TappedFrame {
   std::int64_t frame = 0;
   ImageView image;
   ImageSlot slot = kNoImageSlot;
+  ImageColour colour;  // lent likewise
   FrameLandmarks landmarks;
 };
 static_assert(std::is_trivially_copyable_v<TappedFrame>);
@@ -61,6 +63,9 @@ class ImageTap {
   // null.
   [[nodiscard]] std::shared_ptr<const LiveImage> of_frame(std::int64_t frame) const;
 
+  // Any thread: whether somebody asked within the last seconds.
+  [[nodiscard]] bool is_watched() const;
+
   // Any thread but the real-time one. From now on no request waits: each is answered with null.
   void close();
 
@@ -83,6 +88,7 @@ class ImageTap {
 
   const std::chrono::milliseconds interval_;
   std::atomic<bool> wanted_{false};
+  std::atomic<double> asked_s_{-1};  // s, CLOCK_MONOTONIC: the last request; < 0: none
   std::atomic<bool> ended_{false};
   // One request, one frame: there is never more than one in the queue.
   boost::lockfree::spsc_queue<TappedFrame, boost::lockfree::capacity<2>> frames_;

@@ -12,6 +12,7 @@
 
 #include "platform/system/clock.h"
 #include "platform/system/text.h"
+#include "platform/video/coded_frame.h"
 
 namespace alidade {
 namespace {
@@ -28,8 +29,7 @@ constexpr double kMostWaiting_s = 60;
 
 }  // namespace
 
-LiveRecorder::LiveRecorder(FrameSource& video, LiveRecorderOptions options)
-    : video_(video), options_(std::move(options)) {}
+LiveRecorder::LiveRecorder(LiveRecorderOptions options) : options_(std::move(options)) {}
 
 LiveRecorder::~LiveRecorder() { end(); }
 
@@ -101,7 +101,6 @@ LiveRecorder::Begin LiveRecorder::begin(double duration_s, std::string* error) {
     for (const PanTiltSample& sample : newest_) queue_.push_back({false, {}, sample, 0});
   }
   ending_ = false;
-  static_cast<void>(video_.keep_stream(true));
   takes_ = true;
   writer_ = std::thread([this, duration_s] { write(duration_s); });
   spdlog::info("recording: {} for {:g} s", directory, duration_s);
@@ -203,7 +202,6 @@ void LiveRecorder::write(double duration_s) {
     ends = ends || now_s > last_s;
   }
   takes_ = false;
-  static_cast<void>(video_.keep_stream(false));
   if (error.empty() && copy_->frames() == 0 && !ending_)
     error =
         fmt::format("no picture came that can be stored, for {:g} s", duration_s + kMostWaiting_s);

@@ -23,7 +23,6 @@
 #include "platform/streams/pan_tilt_sample.h"
 #include "platform/system/priority_mutex.h"
 #include "platform/system/semaphore.h"
-#include "platform/video/frame_source.h"
 #include "platform/video/recording_copy.h"
 
 namespace alidade {
@@ -51,8 +50,7 @@ class LiveRecorder {
   static constexpr double kLeast_s = 1;    // duration
   static constexpr double kMost_s = 3600;  // likewise
 
-  // video is borrowed until destruction.
-  LiveRecorder(FrameSource& video, LiveRecorderOptions options);
+  explicit LiveRecorder(LiveRecorderOptions options);
   ~LiveRecorder();
   LiveRecorder(const LiveRecorder&) = delete;
   LiveRecorder& operator=(const LiveRecorder&) = delete;
@@ -69,6 +67,10 @@ class LiveRecorder {
   bool end();
   // Any thread.
   [[nodiscard]] LiveRecording state() const;
+
+  // Any thread: whether frames are to be kept with their stream's pictures
+  // (FrameSource::keep_stream()).
+  [[nodiscard]] bool takes() const { return takes_; }
 
   // The capture thread and the telemetry thread, for each frame and sample. Never wait for the disk.
   void take(const Frame& frame);
@@ -88,7 +90,6 @@ class LiveRecorder {
   [[nodiscard]] bool write(const Item& item, std::string* error);
   void join();
 
-  FrameSource& video_;
   const LiveRecorderOptions options_;
 
   std::atomic<bool> takes_{false};  // items are wanted

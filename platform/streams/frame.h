@@ -40,6 +40,16 @@ struct FrameStamp {
   StampedAt stamped_at = StampedAt::kArrival;
 };
 
+// A picture's colour beside its luma: the values Cb and Cr, each of 2^shift_x x 2^shift_y pixels.
+struct ChromaPlanes {
+  const std::uint8_t* cb = nullptr;  // row v starts at cb + v * stride; null: there is no colour
+  const std::uint8_t* cr = nullptr;  // likewise
+  std::ptrdiff_t stride = 0;         // bytes
+  int step = 1;                      // bytes from one value to the next in its row
+  int shift_x = 0;                   // 0 or more
+  int shift_y = 0;                   // 0 or more
+};
+
 // One frame: its stamp and, if decoded, its luma plane.
 struct Frame {
   FrameStamp stamp;
@@ -50,8 +60,10 @@ struct Frame {
   // source cannot decode (reference data was lost and the next key frame has not come), and for a
   // picture of more than max_pixels.
   const std::uint8_t* luma = nullptr;
-  std::ptrdiff_t stride = 0;          // bytes
-  std::shared_ptr<const void> owner;  // keeps luma alive
+  std::ptrdiff_t stride = 0;  // bytes
+  // Without colour where it would have to be decoded for its own sake.
+  ChromaPlanes chroma;
+  std::shared_ptr<const void> owner;  // keeps luma and chroma alive
   bool interlaced = false;  // coded as two fields: every other row may be of another moment
   // s; time that read() took to decode luma, without waiting and queueing. nullopt: not decoded, or
   // not measured.

@@ -107,8 +107,8 @@ std::string shown_url(const std::string& text) {
   constexpr std::size_t kMost = 120;  // bytes
   Url url;
   std::string error;
-  static_cast<void>(parse_url(text, &url, &error));
-  return shown(url.shown, kMost);
+  const bool is_plain = parse_url(text, &url, &error) && url.user.empty() && url.password.empty();
+  return shown(is_plain ? without_secrets(text) : url.shown, kMost);
 }
 
 bool is_by_tls(std::string_view url_or_scheme) {

@@ -20,6 +20,22 @@ bool has_luma_plane(const AVPixFmtDescriptor* format) {
          format->comp[0].step == 1 && format->comp[0].offset == 0 && format->comp[0].depth == 8;
 }
 
+// Of a frame with a luma plane.
+ChromaPlanes chroma_of(const AVFrame& frame, const AVPixFmtDescriptor& format) {
+  if (format.nb_components < 3) return {};
+  const AVComponentDescriptor& cb = format.comp[1];
+  const AVComponentDescriptor& cr = format.comp[2];
+  if (cb.plane == 0 || cr.plane == 0 || cb.depth != 8 || cr.depth != 8 || cb.step != cr.step ||
+      frame.linesize[cb.plane] != frame.linesize[cr.plane])
+    return {};
+  return {frame.data[cb.plane] + cb.offset,
+          frame.data[cr.plane] + cr.offset,
+          frame.linesize[cb.plane],
+          cb.step,
+          format.log2_chroma_w,
+          format.log2_chroma_h};
+}
+
 }  // namespace
 
 std::optional<CodedBy> coded_by(AVCodecID codec) {
@@ -183,7 +199,11 @@ LumaDecoder::Result LumaDecoder::receive(Picture* picture) {
     return receive(picture);
   }
   beginning_ = false;
-  if (!has_luma_plane(av_pix_fmt_desc_get(static_cast<AVPixelFormat>(frame->format)))) {
+  const AVPixFmtDescriptor* format = av_pix_fmt_desc_get(static_cast<AVPixelFormat>(frame->format));
+  picture->chroma = {};
+  if (has_luma_plane(format)) {
+    picture->chroma = chroma_of(*frame, *format);
+  } else {
     frame = as_grey(*frame);
     if (!frame) {
       return Result::kUnsupported;

@@ -1,11 +1,11 @@
 #pragma once
 // LumaDecoder: decodes pictures to 8-bit luma planes by libavcodec. Live JPEG is decoded by
 // jpeg_decoder.h instead, which skips the chroma and needs half of the time. The luma plane is the
-// decoder's own plane 0 (grey, any 8-bit YUV 4xx, NV12), without copy or conversion; the picture's
-// owner keeps it alive. Other pixel formats (RGB, palettes, more bits) are converted to grey by
-// libswscale, which costs a copy. If H.264 or H.265 starts at a recovery point (after open() or
-// flush()), no picture is returned until all of it is right. Runs only on the caller's thread:
-// frame threads would add frames of delay. One thread at a time.
+// decoder's own plane 0 (grey, any 8-bit YUV 4xx, NV12), without copy or conversion. The chroma is
+// in its other planes. The picture's owner keeps them alive. Other pixel formats (RGB, palettes,
+// more bits) are converted to grey by libswscale, which costs a copy. If H.264 or H.265 starts at a
+// recovery point (after open() or flush()), no picture is returned until all of it is right. Runs
+// only on the caller's thread: frame threads would add frames of delay. One thread at a time.
 
 #include <cstddef>
 #include <cstdint>

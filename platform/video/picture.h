@@ -1,5 +1,5 @@
 #pragma once
-// The luma plane of a decoded picture. Holding `owner` keeps the plane alive.
+// The planes of a decoded picture. Holding `owner` keeps them alive.
 
 #include <cstddef>
 #include <cstdint>
@@ -19,6 +19,7 @@ struct Picture {
   int height = 0;                      // px
   const std::uint8_t* luma = nullptr;  // row v starts at luma + v * stride
   std::ptrdiff_t stride = 0;           // bytes
+  ChromaPlanes chroma;                 // as Frame::chroma
   std::int64_t pts = kNoPts;           // of the packet it was decoded from
   bool interlaced = false;             // coded as two fields, or as one frame of two fields
   std::shared_ptr<const void> owner;
@@ -30,6 +31,7 @@ inline void set_picture(Picture picture, Frame* frame) {
   frame->height = picture.height;
   frame->luma = picture.luma;
   frame->stride = picture.stride;
+  frame->chroma = picture.chroma;
   frame->interlaced = picture.interlaced;
   frame->owner = std::move(picture.owner);
 }

@@ -7,10 +7,6 @@
 
 namespace alidade {
 
-std::size_t coded_bytes(const Frame& frame) {
-  return frame.coded ? static_cast<std::size_t>(frame.coded->packet->size) : 0;
-}
-
 RecordingCopy::RecordingCopy(std::string directory)
     : directory_(std::move(directory)), video_(std::make_unique<StreamCopy>()) {}
 RecordingCopy::~RecordingCopy() = default;

@@ -6,7 +6,6 @@
 // one; the counts are for any thread.
 
 #include <atomic>
-#include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <memory>
@@ -19,9 +18,6 @@
 namespace alidade {
 
 class StreamCopy;
-
-// Bytes of Frame::coded; 0 without.
-[[nodiscard]] std::size_t coded_bytes(const Frame& frame);
 
 class RecordingCopy {
  public:

@@ -338,6 +338,7 @@ ReadStatus RtpSource::deliver(Arrived arrived, Frame& frame) {
   if (options_.decode && picture.luma != nullptr) {
     frame.luma = picture.luma;
     frame.stride = picture.stride;
+    frame.chroma = picture.chroma;
     frame.owner = std::move(picture.owner);
     frame.decode_s = decode_s;
     frame.interlaced = picture.interlaced;

@@ -15,7 +15,7 @@
 #include "edge_app/output/detection_query.h"
 #include "platform/system/clock.h"
 #include "test/edge_app/output/http_client.h"
-#include "test/edge_app/taps/kept_stream.h"
+#include "test/edge_app/taps/kept_frame.h"
 #include "test/edge_app/tracking/detected_scene.h"
 #include "test/support/temporary_directory.h"
 #include "test/support/zoom_by_formula.h"
@@ -348,8 +348,7 @@ TEST_F(HttpApiTest, BeginsNoRecordingWithoutAPlaceForIt) {
 
 struct RecordedStream {
   TemporaryDirectory directory;
-  test::KeptStream video;
-  LiveRecorder recorder{video, {directory.path(), {}}};
+  LiveRecorder recorder{{directory.path(), {}}};
 };
 
 // The stream comes first: the server must not outlive it.

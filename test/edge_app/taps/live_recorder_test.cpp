@@ -14,7 +14,7 @@
 #include "platform/pan_tilt/recording_pan_tilt_source.h"
 #include "platform/storage/recording.h"
 #include "platform/video/recording_frame_source.h"
-#include "test/edge_app/taps/kept_stream.h"
+#include "test/edge_app/taps/kept_frame.h"
 #include "test/platform/support/eventually.h"
 #include "test/support/temporary_directory.h"
 
@@ -64,20 +64,19 @@ class LiveRecorderTest : public ::testing::Test {
   }
 
   TemporaryDirectory directory_;
-  test::KeptStream video_;
   std::string error_;
-  LiveRecorder recorder_{video_, options()};
+  LiveRecorder recorder_{options()};
 };
 
 TEST_F(LiveRecorderTest, StoresWhatComesUntilItsDurationIsOver) {
   take(0, 5);  // nothing is asked for yet
   EXPECT_EQ(recorder_.state().directory, "");
   ASSERT_EQ(begin(1), LiveRecorder::Begin::kBegun) << error_;
-  EXPECT_TRUE(video_.keeps);
+  EXPECT_TRUE(recorder_.takes());
   EXPECT_TRUE(recorder_.state().under_way);
   take(5, 80);
   ASSERT_TRUE(ends());
-  EXPECT_FALSE(video_.keeps);
+  EXPECT_FALSE(recorder_.takes());
   const LiveRecording done = recorder_.state();
   EXPECT_EQ(done.error, "");
   EXPECT_EQ(done.frames, 50);
@@ -124,7 +123,7 @@ TEST_F(LiveRecorderTest, RefusesOtherDurationsAndPlacesThatCannotBeWritten) {
   EXPECT_EQ(begin(10), LiveRecorder::Begin::kFailed);
   EXPECT_THAT(error_, HasSubstr("set output.recordings to a directory that can be written"));
   EXPECT_FALSE(recorder_.state().under_way);
-  EXPECT_FALSE(video_.keeps);
+  EXPECT_FALSE(recorder_.takes());
 }
 
 TEST_F(LiveRecorderTest, HasTheFilesThatTheConfigurationStates) {
@@ -135,7 +134,7 @@ TEST_F(LiveRecorderTest, HasTheFilesThatTheConfigurationStates) {
     *error = "no place for guess.yaml";
     return works;
   };
-  LiveRecorder recorder(video_, with_files);
+  LiveRecorder recorder(with_files);
   ASSERT_EQ(recorder.begin(10, &error_), LiveRecorder::Begin::kBegun) << error_;
   EXPECT_TRUE(recorder.end());
   EXPECT_TRUE(

@@ -57,6 +57,7 @@ TEST(Url, ShowsNoSecretOfAQuery) {
               AllOf(HasSubstr("rtsp://"), Not(HasSubstr("hid"))));
   EXPECT_THAT(shown_url("http://admin:hidden@h/x"), HasSubstr("http://h/x"));
   EXPECT_EQ(shown_url("/onvif/ptz"), "/onvif/ptz");
+  EXPECT_EQ(shown_url("http://h:80"), "http://h:80") << "as it is written";
 }
 
 TEST(Url, ShowsNoPasswordOfAUrlItCannotParse) {

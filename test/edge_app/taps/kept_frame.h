@@ -1,32 +1,15 @@
 #pragma once
-// A source whose stream can be kept, and frames as it gives them: grey pictures of one size, each of which can be
-// decoded by itself.
+// Frames that have kept their stream's pictures: grey ones of one size, each of which can be decoded by itself.
 
-#include <atomic>
 #include <cstdint>
 #include <cstring>
 #include <memory>
-#include <string>
 #include <utility>
 
-#include "platform/video/frame_source.h"
+#include "platform/streams/frame.h"
 #include "platform/video/stream_copy.h"
 
 namespace alidade::test {
-
-class KeptStream : public FrameSource {
- public:
-  ReadStatus read(Frame& /*frame*/, double /*timeout_s*/) override { return ReadStatus::kTimeout; }
-  bool keep_stream(bool keep) override {
-    keeps = keep;
-    return true;
-  }
-  void stop() override {}
-  [[nodiscard]] std::string error() const override { return ""; }
-  [[nodiscard]] std::string name() const override { return "kept stream"; }
-
-  std::atomic<bool> keeps{false};
-};
 
 // The picture's grey is its number.
 inline Frame kept_frame(std::int64_t number, double receive_time_s, int width = 32,
