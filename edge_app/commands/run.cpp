@@ -7,8 +7,10 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <limits>
 #include <string>
+#include <system_error>
 
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/live_calibration.h"
@@ -28,6 +30,8 @@
 #include "edge_app/output/record_writer.h"
 #include "edge_app/output/status_page.h"
 #include "edge_app/pipeline/pipeline.h"
+#include "edge_app/record/frame_geometry.h"
+#include "edge_app/storage/calibration_file.h"
 #include "edge_app/storage/calibration_store.h"
 #include "platform/storage/recording.h"
 #include "platform/system/clock.h"
@@ -113,13 +117,33 @@ std::unique_ptr<MqttPublisher> make_mqtt(const Config& config, LiveTargets* targ
   return mqtt;
 }
 
-// Null if no directory for recordings is configured.
-std::unique_ptr<LiveRecorder> make_recorder(const Config& config) {
+// Puts the calibration in use where `verify` and `replay` look for that of a recording. Does
+// nothing while there is none. pipeline: null before it runs.
+bool store_calibration_in_use(const Config& config, const LiveState& live, const Pipeline* pipeline,
+                              const std::string& recording, std::string* error) {
+  const auto newest = live.newest();
+  if (!newest || !newest->calibrated || pipeline == nullptr) return true;
+  CalibrationNotes notes;
+  const auto curve = pipeline->zoom_curve();
+  if (curve && newest->camera.zoom) notes.zoom_curve = *curve;
+  if (const auto telemetry = pipeline->telemetry_error()) notes.telemetry_error = *telemetry;
+  notes.pupil = config.camera.pupil;
+  const std::filesystem::path folder = std::filesystem::path(recording) / "alidade";
+  std::error_code code;
+  std::filesystem::create_directory(folder, code);
+  return save_calibration((folder / "calibration.yaml").string(), unpack(newest->camera), notes,
+                          error);
+}
+
+// Null if no directory for recordings is configured. pipeline: borrowed; where it will be.
+std::unique_ptr<LiveRecorder> make_recorder(const Config& config, const LiveState* live,
+                                            const Pipeline* const* pipeline) {
   if (config.output.recordings.empty()) return nullptr;
   LiveRecorderOptions options;
   options.parent = config.output.recordings;
-  options.write_side_files = [config](const std::string& directory, std::string* error) {
-    return write_side_files(config, directory, error);
+  options.write_side_files = [=](const std::string& directory, std::string* error) {
+    return write_side_files(config, directory, error) &&
+           store_calibration_in_use(config, *live, *pipeline, directory, error);
   };
   return std::make_unique<LiveRecorder>(std::move(options));
 }
@@ -197,9 +221,11 @@ int run_live(const RunOptions& options) {
   const auto scene = load_scene(config, calibration);
   std::optional<SceneTap> scene_tap;
   if (scene) of_pipeline.scene = &scene_tap.emplace(*scene, scene_tap_options(config.scene_map));
-  const std::unique_ptr<LiveRecorder> recorder = make_recorder(config);
+  const Pipeline* running = nullptr;
+  const std::unique_ptr<LiveRecorder> recorder = make_recorder(config, &live, &running);
   of_pipeline.recorder = recorder.get();
   Pipeline pipeline(*video, *pan_tilt, sinks, calibrating.calibration.get(), of_pipeline);
+  running = &pipeline;
   HttpApiSources sources;
   sources.live = &live;
   sources.summary = [&pipeline] { return pipeline.summary(); };

@@ -565,6 +565,7 @@ class StatusPage(SystemTest):
             rows = (recording / "frames.csv").read_text(encoding="utf-8").splitlines()[1:]
             self.assertEqual(len(done.stdout.splitlines()), len(rows), recording)
             self.assertTrue((recording / "guess.yaml").is_file())
+            self.assertFalse((recording / "alidade" / "calibration.yaml").exists(), "there is no calibration yet")
 
     def shows_goals(self):
         """Bars end left of the line, in the middle, where a sigma is small enough; at a phone's width nothing is cut off."""
