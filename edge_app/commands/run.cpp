@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <limits>
+#include <optional>
 #include <string>
 #include <system_error>
 
@@ -16,6 +17,7 @@
 #include "edge_app/commands/live_calibration.h"
 #include "edge_app/commands/live_targets.h"
 #include "edge_app/commands/plane.h"
+#include "edge_app/commands/recording_verifier.h"
 #include "edge_app/commands/run.h"
 #include "edge_app/commands/run_report.h"
 #include "edge_app/commands/scene_loading.h"
@@ -249,6 +251,14 @@ int run_live(const RunOptions& options) {
   }
   sources.mqtt = mqtt.get();
   sources.recorder = recorder.get();
+  std::optional<RecordingVerifier> verifier;
+  if (recorder) {
+    verifier.emplace();
+    sources.verify_recording = [&verifier](const auto& directory) {
+      return verifier->begin(directory);
+    };
+    sources.verification = [&verifier] { return verifier->state(); };
+  }
   if (scene) {
     sources.scene = [&scene] { return scene->report(); };
     sources.scene_outlines = &scene->outlines();

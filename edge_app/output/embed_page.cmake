@@ -4,6 +4,7 @@
 # Content-Security-Policy. The policy allows the page's style and script by their SHA-256, and nothing
 # from elsewhere. The modules become one script, in their order, without imports and exports.
 cmake_minimum_required(VERSION 3.16)
+include("${CMAKE_CURRENT_LIST_DIR}/text_pieces.cmake")
 file(READ "${PAGE}/${NAME}.html" page)
 file(READ "${STYLE}" style)
 set(style "\n${style}")
@@ -52,19 +53,7 @@ policy_hash("${script}" script_hash)
 set(policy "default-src 'none'; style-src ${style_hash}; script-src ${script_hash}; connect-src 'self'; img-src data:; ")
 string(APPEND policy "base-uri 'none'; form-action 'none'; frame-ancestors 'none'")
 
-# In pieces that end with a line: a compiler need not take a literal above 65536 bytes.
-set(pieces "")
-while(NOT page STREQUAL "")
-  string(SUBSTRING "${page}" 0 60000 piece)
-  string(FIND "${piece}" "\n" end REVERSE)
-  if(end EQUAL -1)
-    message(FATAL_ERROR "${PAGE}: a line is too long, or the last one has no end")
-  endif()
-  math(EXPR end "${end} + 1")
-  string(SUBSTRING "${page}" 0 ${end} piece)
-  string(SUBSTRING "${page}" ${end} -1 page)
-  string(APPEND pieces "  text += R\"page(${piece})page\";\n")
-endwhile()
+text_pieces("${page}" "${PAGE}" pieces)
 
 file(WRITE "${SOURCE}" "#include \"${HEADER}\"
 

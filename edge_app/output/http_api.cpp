@@ -182,7 +182,7 @@ ServerResponse begin_recording(const HttpApiSources& sources, const std::string&
     case LiveRecorder::Begin::kFailed:
       return http_error(507, error);
   }
-  ServerResponse response = json_response(recording_json(sources.recorder->state()));
+  ServerResponse response = json_response(recording_json(sources));
   response.status = 202;
   return response;
 }
@@ -190,7 +190,19 @@ ServerResponse begin_recording(const HttpApiSources& sources, const std::string&
 ServerResponse end_recording(const HttpApiSources& sources) {
   if (sources.recorder == nullptr) return http_error(409, kNothingStored);
   if (!sources.recorder->end()) return http_error(409, "no recording is under way");
-  return json_response(recording_json(sources.recorder->state()));
+  return json_response(recording_json(sources));
+}
+
+ServerResponse verify_recording(const HttpApiSources& sources) {
+  if (sources.recorder == nullptr) return http_error(409, kNothingStored);
+  const LiveRecording recording = sources.recorder->state();
+  if (recording.under_way) return http_error(409, "a recording is under way; end it first");
+  if (recording.frames == 0) return http_error(409, "there is no recording yet");
+  if (!sources.verify_recording(recording.directory))
+    return http_error(409, "a verification is under way");
+  ServerResponse response = json_response(recording_json(sources));
+  response.status = 202;
+  return response;
 }
 
 ServerResponse stream_ticket(HttpTickets* tickets) {
@@ -371,8 +383,9 @@ void add_api_routes(HttpServer* server, const HttpApiSources& sources) {
     return text_response("text/plain; version=0.0.4; charset=utf-8",
                          service_metrics(sources, server->counters()));
   });
-  server->get("/api/v1/openapi.yaml", HttpAccess::kOpen,
-              [](const ServerRequest&) { return text_response("application/yaml", kOpenApi); });
+  server->get("/api/v1/openapi.yaml", HttpAccess::kOpen, [](const ServerRequest&) {
+    return text_response("application/yaml", openapi_text());
+  });
   server->get("/api/v1/orientation", HttpAccess::kToken,
               [sources](const ServerRequest&) { return orientation(sources); });
   server->post("/api/v1/stream/ticket", HttpAccess::kToken, kMaxQueryBytes,
@@ -415,6 +428,8 @@ void add_api_routes(HttpServer* server, const HttpApiSources& sources) {
       [sources](const ServerRequest& request) { return begin_recording(sources, request.body); });
   server->post("/api/v1/recording/end", HttpAccess::kControl, kMaxQueryBytes,
                [sources](const ServerRequest&) { return end_recording(sources); });
+  server->post("/api/v1/recording/verify", HttpAccess::kControl, kMaxQueryBytes,
+               [sources](const ServerRequest&) { return verify_recording(sources); });
   server->post("/api/v1/hold", HttpAccess::kToken, kMaxQueryBytes,
                [sources](const ServerRequest& request) { return hold(sources, request.body); });
   server->post(

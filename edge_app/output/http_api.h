@@ -14,6 +14,7 @@
 #include "edge_app/output/http/http_server.h"
 #include "edge_app/output/live_state.h"
 #include "edge_app/output/mqtt_publisher.h"
+#include "edge_app/output/recording_verification.h"
 #include "edge_app/output/target_lines.h"
 #include "edge_app/pipeline/pipeline.h"
 #include "edge_app/step/scene_report.h"
@@ -50,7 +51,11 @@ struct HttpApiSources {
   std::function<DetectorsReport()> detectors;  // empty: no built-in detector
   const MqttPublisher* mqtt = nullptr;         // null: no broker
   LiveRecorder* recorder = nullptr;            // null: nothing is stored on request
-  std::function<SceneReport()> scene;          // empty: no scene map is in use
+  // Both set if recorder is. verify_recording: begins to verify a recording; false: another
+  // verification is under way.
+  std::function<bool(const std::string& recording)> verify_recording;
+  std::function<RecordingVerification()> verification;
+  std::function<SceneReport()> scene;  // empty: no scene map is in use
   // What the scene map's keyframes show; null: no scene map is in use.
   const std::vector<SceneOutline>* scene_outlines = nullptr;
   std::string version;

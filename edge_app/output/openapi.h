@@ -1,8 +1,10 @@
 #pragma once
 // The text of openapi.yaml, which describes the HTTP API. The build embeds it in the program.
 
+#include <string>
+
 namespace alidade {
 
-extern const char* const kOpenApi;
+[[nodiscard]] const std::string& openapi_text();
 
 }  // namespace alidade

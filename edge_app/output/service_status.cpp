@@ -161,7 +161,7 @@ nlohmann::ordered_json service_status(const HttpApiSources& sources, const HttpC
   }
   out["detectors"] = sources.detectors ? detectors_json(sources.detectors()) : Json();
   out["scene_map"] = sources.scene ? scene_json(sources.scene(), now_s) : Json();
-  out["recording"] = sources.recorder ? recording_json(sources.recorder->state()) : Json();
+  out["recording"] = sources.recorder ? recording_json(sources) : Json();
   out["page_faults"] = {{"minor", summary.page_faults.minor}, {"major", summary.page_faults.major}};
   Json clients = Json::array();
   for (const ReaderCounters& reader : sources.live->readers())
@@ -176,16 +176,25 @@ nlohmann::ordered_json service_status(const HttpApiSources& sources, const HttpC
   return out;
 }
 
-nlohmann::ordered_json recording_json(const LiveRecording& recording) {
-  const bool any = !recording.directory.empty();
+nlohmann::ordered_json recording_json(const HttpApiSources& sources) {
+  const LiveRecording recording = sources.recorder->state();
+  const RecordingVerification verification = sources.verification();
+  const auto or_absent = [](const std::string& text) { return text.empty() ? Json() : Json(text); };
   return {{"under_way", recording.under_way},
-          {"directory", any ? Json(recording.directory) : Json()},
-          {"asked_s", any ? Json(recording.asked_s) : Json()},
+          {"directory", or_absent(recording.directory)},
+          {"asked_s", recording.directory.empty() ? Json() : Json(recording.asked_s)},
           {"length_s", recording.length_s},
           {"frames", recording.frames},
           {"samples", recording.samples},
           {"left_out", recording.left_out},
-          {"error", recording.error.empty() ? Json() : Json(recording.error)}};
+          {"error", or_absent(recording.error)},
+          {"verification",
+           {{"state", to_string(verification.state)},
+            {"recording", or_absent(verification.recording)},
+            {"verdict", or_absent(verification.verdict)},
+            {"sentence", or_absent(verification.sentence)},
+            {"report", or_absent(verification.report)},
+            {"error", or_absent(verification.error)}}}};
 }
 
 }  // namespace alidade

@@ -11,7 +11,8 @@ namespace alidade {
 [[nodiscard]] nlohmann::ordered_json service_status(const HttpApiSources& sources,
                                                     const HttpCounters& http);
 
-// What the status says of recordings, and the answer of POST /api/v1/recording.
-[[nodiscard]] nlohmann::ordered_json recording_json(const LiveRecording& recording);
+// What the status says of recordings, and the answer of POST /api/v1/recording. sources.recorder
+// must not be null.
+[[nodiscard]] nlohmann::ordered_json recording_json(const HttpApiSources& sources);
 
 }  // namespace alidade

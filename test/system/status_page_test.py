@@ -557,6 +557,10 @@ class StatusPage(SystemTest):
         self.screenshot("recording.png")
         button.send_keys(Keys.ENTER)
         self.wait_for_text("record", "^Record$")
+        verify = self.browser.find_element(By.ID, "verify")
+        wait_until(verify.is_displayed, "the button Verify")
+        verify.send_keys(Keys.ENTER)
+        self.wait_for_text("verified", r"^Not verified: .*: has no calibration .*alidade/calibration\.yaml")
         recordings = sorted((self.folder / "recordings").iterdir())
         self.assertEqual(len(recordings), 2)
         for recording in recordings:

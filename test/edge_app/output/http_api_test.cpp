@@ -45,6 +45,12 @@ class HttpApiTest : public ::testing::Test {
                        std::function<SceneReport()> scene = {}, LiveRecorder* recorder = nullptr) {
     HttpApiSources sources;
     sources.recorder = recorder;
+    sources.verify_recording = [this](const std::string& recording) {
+      const bool begins = verification_.state != RecordingVerification::State::kRunning;
+      verification_ = {RecordingVerification::State::kRunning, recording, "", "", "", ""};
+      return begins;
+    };
+    sources.verification = [this] { return verification_; };
     sources.targets = feed;
     sources.target_lines = lines;
     sources.live = &live_;
@@ -89,6 +95,7 @@ class HttpApiTest : public ::testing::Test {
   std::shared_ptr<const ZoomCurve> curve_;
   std::shared_ptr<const TelemetryError> telemetry_error_;
   std::shared_ptr<const CalibrationProgress> progress_;
+  RecordingVerification verification_;
   bool calibrating_ = false;
   bool asked_ = false;
   HttpServer server_{HttpServerOptions{}};
@@ -339,7 +346,8 @@ TEST_F(HttpApiTest, WithoutASceneMapSaysHowToHaveOne) {
 
 TEST_F(HttpApiTest, BeginsNoRecordingWithoutAPlaceForIt) {
   EXPECT_TRUE(body_of(get("/api/v1/status"))["recording"].is_null());
-  for (const char* path : {"/api/v1/recording", "/api/v1/recording/end"}) {
+  for (const char* path :
+       {"/api/v1/recording", "/api/v1/recording/end", "/api/v1/recording/verify"}) {
     const std::string answer = post(path, R"({"duration_s": 10})");
     EXPECT_THAT(answer, StartsWith("HTTP/1.1 409"));
     EXPECT_THAT(answer, HasSubstr("set output.recordings to a directory"));
@@ -362,7 +370,10 @@ class HttpApiWithRecorderTest : private RecordedStream, public HttpApiTest {
 TEST_F(HttpApiWithRecorderTest, BeginsAndEndsARecording) {
   EXPECT_EQ(body_of(get("/api/v1/status"))["recording"],
             json::parse(R"({"under_way": false, "directory": null, "asked_s": null, "length_s": 0.0,
-                            "frames": 0, "samples": 0, "left_out": 0, "error": null})"));
+                            "frames": 0, "samples": 0, "left_out": 0, "error": null,
+                            "verification": {"state": "none", "recording": null, "verdict": null,
+                                             "sentence": null, "report": null, "error": null}})"));
+  EXPECT_THAT(post("/api/v1/recording/verify", ""), HasSubstr("there is no recording yet"));
   EXPECT_THAT(post("/api/v1/recording/end", ""), StartsWith("HTTP/1.1 409"));
   for (const char* wrong : {"", "{}", "[]", R"({"duration_s": "10"})", R"({"duration_s": 0})",
                             R"({"duration_s": 1e9})", R"({"duration_s": 10, "x": 1})"}) {
@@ -373,12 +384,27 @@ TEST_F(HttpApiWithRecorderTest, BeginsAndEndsARecording) {
   EXPECT_THAT(body_of(begun)["directory"], StartsWith(directory.path()));
   EXPECT_EQ(body_of(begun)["asked_s"], 10);
   EXPECT_THAT(post("/api/v1/recording", R"({"duration_s": 10})"), StartsWith("HTTP/1.1 409"));
+  EXPECT_THAT(post("/api/v1/recording/verify", ""), HasSubstr("end it first"));
   for (int i = 0; i < 5; ++i) recorder.take(test::kept_frame(i, 7 + 0.1 * i));
   const std::string ended = post("/api/v1/recording/end", "");
   EXPECT_THAT(ended, StartsWith("HTTP/1.1 200"));
   EXPECT_EQ(body_of(ended)["frames"], 5);
   EXPECT_EQ(body_of(ended)["under_way"], false);
   EXPECT_EQ(body_of(get("/api/v1/status"))["recording"], body_of(ended));
+
+  const std::string verifying = post("/api/v1/recording/verify", "");
+  EXPECT_THAT(verifying, StartsWith("HTTP/1.1 202"));
+  EXPECT_EQ(body_of(verifying)["verification"]["state"], "running");
+  EXPECT_EQ(body_of(verifying)["verification"]["recording"], body_of(ended)["directory"]);
+  EXPECT_THAT(post("/api/v1/recording/verify", ""), StartsWith("HTTP/1.1 409"));
+  verification_.state = RecordingVerification::State::kDone;
+  verification_.verdict = "holds";
+  verification_.sentence = "sigmas hold";
+  const json told = body_of(get("/api/v1/status"))["recording"]["verification"];
+  EXPECT_EQ(told["state"], "done");
+  EXPECT_EQ(told["verdict"], "holds");
+  EXPECT_EQ(told["sentence"], "sigmas hold");
+  EXPECT_TRUE(told["error"].is_null());
 }
 
 class HttpApiWithSceneMapTest : public HttpApiTest {

@@ -143,7 +143,7 @@ TEST(RecordFormat, WhatIsNotFiniteHasNoValue) {
 }
 
 TEST(RecordFormat, EveryFieldIsInTheDescriptionOfTheApi) {
-  const std::string description = kOpenApi;
+  const std::string& description = openapi_text();
   const auto record = nlohmann::json::parse(json_line(full_record()));
   for (const auto& [name, value] : record.items())
     EXPECT_NE(description.find("\n        " + name + ": {"), std::string::npos) << name;
