@@ -41,6 +41,8 @@ bool NameLookup::begin() {
 }
 
 std::vector<HostAddress> NameLookup::take(std::string* error) {
+  // The caller may only have waited for the descriptor, which orders no memory: this does.
+  static_cast<void>(errand_.is_over());
   const std::shared_ptr<Found> found = std::exchange(found_, nullptr);
   if (found->code != 0) {
     *error = std::string("the host is not found: ") + ::gai_strerror(found->code);
