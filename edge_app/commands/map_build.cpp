@@ -150,6 +150,25 @@ std::vector<Chosen> choose(const std::vector<MapRecording>& recordings,
   return out;
 }
 
+// A calibration knows the focal length better than the pictures of a map do: over a narrow range
+// of angles only the perspective within each picture shows it, and small errors of the pictures
+// feign that. So it stays within its sigma, and what temperature and focus do to a lens from day to
+// day. How far a movement of the zoom misses its reading is `repeatability`.
+void hold_focal_length(const PublishedCalibration& known, MapBuildOptions* build) {
+  constexpr double kFromDayToDay = 1e-4;  // of f
+  double sigma = 0;
+  if (known.zoom_curve.empty()) sigma = relative_focal_length_sigma(known.calibration);
+  const ZoomCurve::Content& curve = known.zoom_curve.content();
+  for (int i = 0; i < curve.nodes; ++i) {
+    if (!curve.is_between[static_cast<std::size_t>(i)])
+      sigma = std::max(sigma, relative_focal_length_sigma(known.zoom_curve.node(i)));
+  }
+  if (!known.zoom_curve.empty()) build->repeatability = std::max(1e-4, curve.repeatability);
+  const double held = std::hypot(kFromDayToDay, sigma);
+  for (double* prior : {&build->adjustment.level_sigma[0], &build->adjustment.bend_sigma[0]})
+    *prior = std::min(*prior, held);
+}
+
 // The existing map, with the pictures of its keyframes; empty without a path.
 SceneMap map_to_add(const std::string& path, const MapBuildOptions& build) {
   SceneMap map;
@@ -306,6 +325,7 @@ int build_map(const MapBuildCommand& options) {
                              "covers; leave it out, or record telemetry with zoom");
     }
   }
+  if (known != nullptr && options.focal_length.empty()) hold_focal_length(*calibration, &build);
   Progress progress;
   MapBuilder builder(build);
   const FeatureDetector detector;
