@@ -218,8 +218,9 @@ void CalibrationStore::load_file(const std::string& path, int width, int height,
   if ((width > 0 && camera.width != width) || (height > 0 && camera.height != height)) {
     lines->push_back(
         fmt::format("{}: for pictures of {}x{} px, but video.width and video.height are {} and "
-                    "{}; {}",
-                    path, camera.width, camera.height, width, height, set_file_aside(path)));
+                    "{}: not used; it stays until another calibration is stored",
+                    path, camera.width, camera.height, width, height));
+    other_size_.push_back(path);
     return;
   }
   const std::optional<double>& zoom = stored.calibration.zoom;
@@ -275,6 +276,10 @@ const StoredCalibration* CalibrationStore::find(std::optional<double> zoom) cons
 }
 
 bool CalibrationStore::save(const StoredCalibration& calibration, std::string* error) {
+  // Pictures have come in the configured size: it is right.
+  for (const std::string& path : other_size_)
+    static_cast<void>(set_aside_with_maps(path, ".replaced"));
+  other_size_.clear();
   const std::optional<std::size_t> same = nearest(calibration.calibration.zoom);
   const std::size_t at = same.value_or(entries_.size());
   if (!same) entries_.emplace_back();

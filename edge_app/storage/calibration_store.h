@@ -6,9 +6,11 @@
 //                          inside the file counts, not the zoom in its name.
 //   *.map-1a2b3c4d.bin     the map that a yaml names, beside the yaml, tied to it by checksum
 //                          (map_file.h)
-// A damaged file is set aside and logged, never used. Files are written atomically: a power cut
-// leaves the old calibration and map, or the new ones. Where the zoom curve is, and the order of
-// writing: docs/derivations.md. Not for the real-time thread. One thread.
+// A damaged file is set aside and logged, never used. One for pictures of another size is not used,
+// but stays until another calibration is saved: the configured size may be a slip. Files are
+// written atomically: a power cut leaves the old calibration and map, or the new ones. Where the
+// zoom curve is, and the order of writing: docs/derivations.md. Not for the real-time thread. One
+// thread.
 
 #include <cstddef>
 #include <optional>
@@ -77,8 +79,9 @@ class CalibrationStore final : public CalibrationArchive {
   Use use_ = Use::kKeep;
   std::vector<Entry> entries_;
   ZoomCurve curve_;
-  std::string curve_path_;             // of the file that holds curve_
-  mutable StoredCalibration between_;  // what find() last made from the curve
+  std::string curve_path_;               // of the file that holds curve_
+  std::vector<std::string> other_size_;  // files of calibrations for other pictures
+  mutable StoredCalibration between_;    // what find() last made from the curve
 };
 
 }  // namespace alidade

@@ -350,13 +350,13 @@ TEST_F(CommandLineTest, CheckTakesTheCalibrationThatRunTakes) {
               HasSubstr("calibration    " + path("calibration.zoom-1.yaml") + ": 1920x1080 px"));
   EXPECT_THAT(check.errors,
               AllOf(Not(HasSubstr("cannot be read")), Not(HasSubstr("no calibration yet"))));
-  // Of another size: run would set it aside, who looks does not.
+  // Of another size: it is not used, and stays.
   const std::string other =
       live_config(", width: 640, height: 480",
                   "camera: {focal_length_px: 30000}\ncalibration: {file: calibration.yaml}\n");
   const Result of_another_size = alidade({"check", "-c", other, "--duration", "0.1"});
   EXPECT_THAT(of_another_size.output, HasSubstr("calibration    data sheet: not calibrated"));
-  EXPECT_THAT(of_another_size.errors, HasSubstr("run would set it aside"));
+  EXPECT_THAT(of_another_size.errors, HasSubstr("it stays until another calibration is stored"));
   EXPECT_EQ(directory_.read("calibration.zoom-1.yaml"), stored);
   // Nothing at all: the reason is run's.
   const std::string nothing =

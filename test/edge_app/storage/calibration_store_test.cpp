@@ -327,24 +327,27 @@ TEST_F(CalibrationStoreTest, SetsADamagedFileAsideAndNeverOverOne) {
   EXPECT_THAT(again.load(kWidth, kHeight), IsEmpty());
 }
 
-TEST_F(CalibrationStoreTest, SetsAsideWhatIsOfAnotherSizeWithItsMap) {
+// The configured size may be a slip: only when a calibration of that size is stored was it none.
+TEST_F(CalibrationStoreTest, SetsAsideWhatIsOfAnotherSizeWithItsMapWhenAnotherIsStored) {
   put(some(1000));
   const std::string map = map_name();
   const std::string yaml = directory_.read("calibration.yaml");
+  const std::set<std::string> before = files();
   CalibrationStore other = store();
   EXPECT_THAT(other.load(1920, 1080),
               ElementsAre(AllOf(HasSubstr("640x480"),
                                 HasSubstr("video.width and video.height are 1920 and 1080"),
-                                HasSubstr("set aside as calibration.yaml.damaged"))));
+                                HasSubstr("it stays until another calibration is stored"))));
   EXPECT_EQ(other.find({}), nullptr);
+  EXPECT_EQ(files(), before);
   StoredCalibration large = some(3000);
   large.calibration.camera.width = 1920;
   large.calibration.camera.height = 1080;
   std::string error;
   ASSERT_TRUE(other.save(large, &error)) << error;
   // Both are still there for the day the size is changed back.
-  EXPECT_EQ(directory_.read("calibration.yaml.damaged"), yaml);
-  EXPECT_THAT(files(), Contains(map + ".damaged"));
+  EXPECT_EQ(directory_.read("calibration.yaml.replaced"), yaml);
+  EXPECT_THAT(files(), Contains(map + ".replaced"));
 }
 
 TEST_F(CalibrationStoreTest, WhoOnlyLooksTouchesNoFile) {
@@ -352,7 +355,7 @@ TEST_F(CalibrationStoreTest, WhoOnlyLooksTouchesNoFile) {
   const std::set<std::string> before = files();
   CalibrationStore looking = store();
   EXPECT_THAT(looking.load(1920, 1080, CalibrationStore::Use::kLook),
-              ElementsAre(HasSubstr("run would set it aside")));
+              ElementsAre(HasSubstr("it stays until another calibration is stored")));
   EXPECT_TRUE(looking.empty());
   EXPECT_EQ(files(), before);
 }
