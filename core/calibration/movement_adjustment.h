@@ -67,8 +67,8 @@ class MovementAdjustment {
   }
   // d log f / d unknowns.
   [[nodiscard]] Eigen::VectorXd log_f_row(double time_s) const;
-  // Covariance of the unknowns, enlarged if the residuals exceed their sigmas. Includes a weak prior
-  // of each log f, of sigma 0.5.
+  // Covariance of the unknowns, enlarged if the residuals exceed their sigmas. Includes a weak
+  // prior of each log f, of sigma 0.5.
   [[nodiscard]] const Eigen::MatrixXd& covariance() const { return covariance_; }
   // RMS of the residuals of observations and telemetry over their sigmas, by their redundancy. n is
   // not among them; a residual of telemetry counts as at most 3 sigmas.

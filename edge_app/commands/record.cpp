@@ -1,5 +1,5 @@
-// `alidade record`: stores the live streams as a recording (recording_copy.h). The recording and its
-// duration begin with the first frame.
+// `alidade record`: stores the live streams as a recording (recording_copy.h). The recording and
+// its duration begin with the first frame.
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>

@@ -1,7 +1,7 @@
 #pragma once
-// RecordingVerifier: runs `alidade verify RECORDING` while `run` goes on: this program, started again
-// in a process of its own, so that neither its memory nor a crash of it is that of `run`. It has the
-// lowest priority, and is killed after half an hour.
+// RecordingVerifier: runs `alidade verify RECORDING` while `run` goes on. It starts this program
+// again in a process of its own, so that neither its memory nor a crash of it is that of `run`. The
+// process has the lowest priority, and is killed after half an hour.
 
 #include <atomic>
 #include <mutex>

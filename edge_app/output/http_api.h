@@ -1,8 +1,8 @@
 #pragma once
 // The HTTP endpoints of `alidade run`, described by openapi.yaml. They give the data of LiveState
 // and pipeline as JSON, Server-Sent Events and Prometheus text, and take detections, held frames,
-// plane fits and requests for a calibration or a recording. Handlers run on the server's threads. Nothing here
-// touches the real-time thread.
+// plane fits and requests for a calibration or a recording. Handlers run on the server's threads.
+// Nothing here touches the real-time thread.
 
 #include <functional>
 #include <memory>

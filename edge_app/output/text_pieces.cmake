@@ -1,5 +1,6 @@
 # text_pieces(TEXT NAME RESULT): statements of C++ that append the text to the string `text`, in
-# pieces that end with a line: a compiler need not take a literal above 65536 bytes. NAME: for messages.
+# pieces that end with a line: a compiler need not take a literal above 65536 bytes.
+# NAME: for messages.
 function(text_pieces text name result)
   set(pieces "")
   while(NOT text STREQUAL "")

@@ -72,7 +72,8 @@ class LiveRecorder {
   // (FrameSource::keep_stream()).
   [[nodiscard]] bool takes() const { return takes_; }
 
-  // The capture thread and the telemetry thread, for each frame and sample. Never wait for the disk.
+  // The capture thread and the telemetry thread, for each frame and sample. Never wait for the
+  // disk.
   void take(const Frame& frame);
   void take(const PanTiltSample& sample);
 

@@ -68,8 +68,8 @@ struct Frame {
   // s; time that read() took to decode luma, without waiting and queueing. nullopt: not decoded, or
   // not measured.
   std::optional<double> decode_s;
-  // The picture as the stream carries it. Null unless FrameSource::keep_stream() asked for it, for a
-  // picture that cannot be decoded, or needs one that could not, and for one of more than
+  // The picture as the stream carries it. Null unless FrameSource::keep_stream() asked for it. Null
+  // for a picture that cannot be decoded, or needs one that could not, and for one of more than
   // max_pixels.
   std::shared_ptr<const StreamPicture> coded;
 };

@@ -26,7 +26,8 @@ struct Url {
 // srt://h:1?passphrase=***. A value ends at the next of & ; #, before the query also at / and ?.
 [[nodiscard]] std::string without_secrets(std::string_view url);
 
-// A foreign address for messages, without secrets: its first 120 bytes, escaped. text may be no URL.
+// A foreign address for messages, without secrets: its first 120 bytes, escaped. text may be no
+// URL.
 [[nodiscard]] std::string shown_url(const std::string& text);
 
 // True if the text is a URL over TLS, or the scheme of one: https, rtsps, mqtts.

@@ -190,8 +190,8 @@ ReadStatus RtpPorts::receive(double deadline_s, std::uint8_t* data, std::size_t 
                              ReceivedPacket* packet, std::string* error) {
   auto& [media, reports] = sockets_;
   while (!interrupted_) {
-    // Between pictures a report goes first: behind pictures that wait it would come too late for all
-    // of them, which have their UTC by it.
+    // Between pictures a report goes first. Those that wait have their UTC by it: behind them it
+    // would come too late.
     ReadStatus status =
         amid_picture_ ? ReadStatus::kTimeout : take(&reports, data, capacity, packet, error);
     if (status == ReadStatus::kTimeout) {

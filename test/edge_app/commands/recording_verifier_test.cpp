@@ -1,4 +1,5 @@
-// A verification beside `run`: what becomes of each way in which the process may end. A script takes its place.
+// A verification beside `run`: what becomes of each way in which the process may end. A script takes
+// its place.
 
 #include "edge_app/commands/recording_verifier.h"
 

@@ -1,5 +1,6 @@
 #pragma once
-// Frames that have kept their stream's pictures: grey ones of one size, each of which can be decoded by itself.
+// Frames that have kept their stream's pictures: grey ones of one size, each of which can be decoded
+// by itself.
 
 #include <cstdint>
 #include <cstring>

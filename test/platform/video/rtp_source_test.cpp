@@ -216,7 +216,8 @@ TEST_P(RtpSourceTimestamps, AreUnwrappedAndGiveUtcFromTheFirstReportOn) {
   if (report_first) report();
   FrameStamp first;
   int with_utc = 0;
-  // On a busy machine many pictures may have come before the report that follows the sixth that is read.
+  // On a busy machine many pictures may have come before the report that follows the sixth that is
+  // read.
   for (int i = 0; i < enough; ++i) {
     Frame frame;
     ASSERT_TRUE(next(*source, sender, relay, frame)) << source->error();
@@ -838,8 +839,8 @@ INSTANTIATE_TEST_SUITE_P(Codecs, RtpSourceCopy,
                          ::testing::Values(Codec::kMjpeg, Codec::kH264, Codec::kH265),
                          ::testing::PrintToStringParamName());
 
-// The camera's pictures from number `begin` on are kept; number 14 is lost. Returns the greys that the
-// recording must have.
+// The camera's pictures from number `begin` on are kept; number 14 is lost. Returns the greys that
+// the recording must have.
 std::vector<double> greys_with_a_loss(FrameSource& source, int port, Codec codec,
                                       std::int64_t begin, RecordingCopy* copy) {
   RtpRelay relay(port);
