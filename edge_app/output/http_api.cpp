@@ -36,6 +36,13 @@ ServerResponse json_response(const Json& body) {
   return response;
 }
 
+// 202: it was begun.
+ServerResponse accepted_response(const Json& body) {
+  ServerResponse response = json_response(body);
+  response.status = 202;
+  return response;
+}
+
 ServerResponse text_response(const char* type, std::string body) {
   ServerResponse response;
   response.type = type;
@@ -152,11 +159,9 @@ ServerResponse calibrate(const HttpApiSources& sources, CalibrationPause* pause)
                       "nothing is calibrated here: that needs mode OE, live video and "
                       "calibration.auto: true");
   pause->began_s = now_s;
-  ServerResponse response =
-      json_response({{"accepted", true},
-                     {"note", "move the camera; status says what it needs, and when it is done"}});
-  response.status = 202;
-  return response;
+  return accepted_response(
+      {{"accepted", true},
+       {"note", "move the camera; status says what it needs, and when it is done"}});
 }
 
 constexpr const char* kNothingStored =
@@ -182,9 +187,7 @@ ServerResponse begin_recording(const HttpApiSources& sources, const std::string&
     case LiveRecorder::Begin::kFailed:
       return http_error(507, error);
   }
-  ServerResponse response = json_response(recording_json(sources));
-  response.status = 202;
-  return response;
+  return accepted_response(recording_json(sources));
 }
 
 ServerResponse end_recording(const HttpApiSources& sources) {
@@ -200,9 +203,7 @@ ServerResponse verify_recording(const HttpApiSources& sources) {
   if (recording.frames == 0) return http_error(409, "there is no recording yet");
   if (!sources.verify_recording(recording.directory))
     return http_error(409, "a verification is under way");
-  ServerResponse response = json_response(recording_json(sources));
-  response.status = 202;
-  return response;
+  return accepted_response(recording_json(sources));
 }
 
 ServerResponse stream_ticket(HttpTickets* tickets) {
@@ -330,11 +331,7 @@ ServerResponse detections(const HttpApiSources& sources, const std::string& body
   accepted["left_out"] = Json::array();
   for (const DetectionAnswer::LeftOut& one : answer.left_out)
     accepted["left_out"].push_back({{"box", one.box}, {"reason", to_string(one.fault)}});
-  if (is_taken(answer.status)) {
-    ServerResponse response = json_response(accepted);
-    response.status = 202;
-    return response;
-  }
+  if (is_taken(answer.status)) return accepted_response(accepted);
   ServerResponse refusal = http_error(http_status_of(answer.status), to_string(answer.status));
   if (answer.status == DetectionStatus::kQueueFull)
     refusal.headers.emplace_back("Retry-After", "1");

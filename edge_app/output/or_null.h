@@ -1,14 +1,19 @@
 #pragma once
-// An optional value as JSON: null if it is empty. Pure.
+// An optional value or a text as JSON: null if it is empty. Pure.
 
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <string>
 
 namespace alidade {
 
 template <typename T>
 nlohmann::ordered_json or_null(const std::optional<T>& value) {
   return value ? nlohmann::ordered_json(*value) : nlohmann::ordered_json();
+}
+
+inline nlohmann::ordered_json or_null(const std::string& text) {
+  return text.empty() ? nlohmann::ordered_json() : nlohmann::ordered_json(text);
 }
 
 }  // namespace alidade

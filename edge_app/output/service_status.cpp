@@ -179,22 +179,21 @@ nlohmann::ordered_json service_status(const HttpApiSources& sources, const HttpC
 nlohmann::ordered_json recording_json(const HttpApiSources& sources) {
   const LiveRecording recording = sources.recorder->state();
   const RecordingVerification verification = sources.verification();
-  const auto or_absent = [](const std::string& text) { return text.empty() ? Json() : Json(text); };
   return {{"under_way", recording.under_way},
-          {"directory", or_absent(recording.directory)},
+          {"directory", or_null(recording.directory)},
           {"asked_s", recording.directory.empty() ? Json() : Json(recording.asked_s)},
           {"length_s", recording.length_s},
           {"frames", recording.frames},
           {"samples", recording.samples},
           {"left_out", recording.left_out},
-          {"error", or_absent(recording.error)},
+          {"error", or_null(recording.error)},
           {"verification",
            {{"state", to_string(verification.state)},
-            {"recording", or_absent(verification.recording)},
-            {"verdict", or_absent(verification.verdict)},
-            {"sentence", or_absent(verification.sentence)},
-            {"report", or_absent(verification.report)},
-            {"error", or_absent(verification.error)}}}};
+            {"recording", or_null(verification.recording)},
+            {"verdict", or_null(verification.verdict)},
+            {"sentence", or_null(verification.sentence)},
+            {"report", or_null(verification.report)},
+            {"error", or_null(verification.error)}}}};
 }
 
 }  // namespace alidade
