@@ -8,7 +8,9 @@
 namespace alidade {
 
 RecordingCopy::RecordingCopy(std::string directory)
-    : directory_(std::move(directory)), video_(std::make_unique<StreamCopy>()) {}
+    : directory_(std::move(directory)),
+      video_(std::make_unique<StreamCopy>(
+          (std::filesystem::path(directory_) / "video.mkv").string())) {}
 RecordingCopy::~RecordingCopy() = default;
 
 std::string RecordingCopy::fault_of(const Frame& frame) const {
@@ -27,8 +29,7 @@ bool RecordingCopy::add(const Frame& frame, std::string* error) {
   FrameStamp stamp = frame.stamp;
   stamp.frame = frames_;
   stamp.restarted = std::exchange(restarted_, false) || stamp.restarted;
-  const std::string path = (std::filesystem::path(directory_) / "video.mkv").string();
-  if (!video_->add(path, *frame.coded, stamp.receive_time_s, error)) return false;
+  if (!video_->add(*frame.coded, stamp.receive_time_s, error)) return false;
   if (!tables_.add_frame(stamp, error)) return false;
   if (frames_ == 0) first_receive_s_ = stamp.receive_time_s;
   last_receive_s_ = stamp.receive_time_s;

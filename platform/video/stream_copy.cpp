@@ -7,6 +7,7 @@ extern "C" {
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <utility>
 
 namespace alidade {
 namespace {
@@ -78,6 +79,8 @@ PacketPtr make_picture_packet(std::size_t bytes) {
   return packet;
 }
 
+StreamCopy::StreamCopy(std::string path) : path_(std::move(path)) {}
+
 StreamCopy::~StreamCopy() {
   if (format_ != nullptr) {
     if (header_written_) {
@@ -88,8 +91,7 @@ StreamCopy::~StreamCopy() {
   }
 }
 
-int StreamCopy::create(const std::string& path, const StreamPicture& first) {
-  path_ = path;
+int StreamCopy::create(const StreamPicture& first) {
   parameters_.reset(avcodec_parameters_alloc());
   int code = avcodec_parameters_copy(parameters_.get(), first.parameters.get());
   if (code < 0) {
@@ -108,7 +110,7 @@ int StreamCopy::create(const std::string& path, const StreamPicture& first) {
       return code;
     }
   }
-  code = avformat_alloc_output_context2(&format_, nullptr, "matroska", path.c_str());
+  code = avformat_alloc_output_context2(&format_, nullptr, "matroska", path_.c_str());
   if (code < 0) {
     return code;
   }
@@ -116,7 +118,7 @@ int StreamCopy::create(const std::string& path, const StreamPicture& first) {
   code = stream == nullptr ? AVERROR(ENOMEM)
                            : avcodec_parameters_copy(stream->codecpar, parameters_.get());
   if (code >= 0) {
-    code = avio_open(&format_->pb, path.c_str(), AVIO_FLAG_WRITE);
+    code = avio_open(&format_->pb, path_.c_str(), AVIO_FLAG_WRITE);
   }
   if (code >= 0) {
     format_->flags |= AVFMT_FLAG_FLUSH_PACKETS;
@@ -145,11 +147,10 @@ std::string StreamCopy::fault_of(const StreamPicture& picture) const {
   return "";
 }
 
-bool StreamCopy::add(const std::string& path, const StreamPicture& picture, double receive_time_s,
-                     std::string* error) {
+bool StreamCopy::add(const StreamPicture& picture, double receive_time_s, std::string* error) {
   int code = 0;
   if (format_ == nullptr) {
-    code = create(path, picture);
+    code = create(picture);
     first_receive_time_s_ = receive_time_s;
   }
   if (code >= 0) {
@@ -170,7 +171,7 @@ bool StreamCopy::add(const std::string& path, const StreamPicture& picture, doub
     code = format_->pb->error;  // a failure of the flush is reported only here
   }
   if (code < 0) {
-    *error = "cannot write " + path + ": " + av_error_text(code);
+    *error = "cannot write " + path_ + ": " + av_error_text(code);
     return false;
   }
   return true;

@@ -32,7 +32,8 @@ struct StreamPicture {
 
 class StreamCopy {
  public:
-  StreamCopy() = default;
+  // path: of the file; add() creates it.
+  explicit StreamCopy(std::string path);
   ~StreamCopy();
   StreamCopy(const StreamCopy&) = delete;
   StreamCopy& operator=(const StreamCopy&) = delete;
@@ -41,17 +42,16 @@ class StreamCopy {
   // first one. One line; empty: it can.
   [[nodiscard]] std::string fault_of(const StreamPicture& picture) const;
 
-  // Adds a picture without fault; the first call creates the file `path`. receive_time_s: s. On
-  // false, *error is one line.
-  [[nodiscard]] bool add(const std::string& path, const StreamPicture& picture,
-                         double receive_time_s, std::string* error);
+  // Adds a picture without fault; the first call creates the file. receive_time_s: s. On false,
+  // *error is one line.
+  [[nodiscard]] bool add(const StreamPicture& picture, double receive_time_s, std::string* error);
 
  private:
-  [[nodiscard]] int create(const std::string& path, const StreamPicture& first);
+  [[nodiscard]] int create(const StreamPicture& first);
 
+  const std::string path_;
   AVFormatContext* format_ = nullptr;
   bool header_written_ = false;
-  std::string path_;
   CodecParametersPtr parameters_;  // of the stream that started the file
   double first_receive_time_s_ = 0;
   std::int64_t last_pts_ = -1;

@@ -130,7 +130,7 @@ TEST(StreamCopy, StoresUncompressedLumaThatARecordingGivesBack) {
   directory.write("frames.csv", "frame,receive_time_s\n0,0.5\n1,0.51\n2,0.52\n3,0.53\n");
   const auto grey = [](int picture, int place) { return (7 * picture + place) % 256; };
   {
-    StreamCopy copy;
+    StreamCopy copy(directory.path() + "/video.mkv");
     for (int i = 0; i < kPictures; ++i) {
       StreamPicture picture;
       picture.packet = make_picture_packet(kWidth * kHeight);
@@ -143,8 +143,7 @@ TEST(StreamCopy, StoresUncompressedLumaThatARecordingGivesBack) {
       picture.height = kHeight;
       EXPECT_EQ(copy.fault_of(picture), "");
       std::string error;
-      ASSERT_TRUE(copy.add(directory.path() + "/video.mkv", picture, 0.5 + 0.01 * i, &error))
-          << error;
+      ASSERT_TRUE(copy.add(picture, 0.5 + 0.01 * i, &error)) << error;
     }
   }
   const auto recording = open_recorded_frames({directory.path(), true, false});
