@@ -21,7 +21,6 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kMostItems = 2048;            // some seconds of both streams
 constexpr std::size_t kMostBytes = 64U << 20U;      // of pictures
-constexpr std::size_t kNewestSamples = 256;         // telemetry from before the first frame
 constexpr std::uintmax_t kLeastFree = 256U << 20U;  // bytes; the calibration must still find room
 constexpr double kRoomPeriod_s = 1;
 // A stream may begin with many seconds without a key frame.
@@ -143,7 +142,7 @@ void LiveRecorder::take(const PanTiltSample& sample) {
   {
     const std::lock_guard<PriorityMutex> lock(queue_mutex_);
     newest_.push_back(sample);
-    if (newest_.size() > kNewestSamples) newest_.pop_front();
+    if (newest_.size() > RecordingCopy::kEarlySamples) newest_.pop_front();
   }
   if (takes_) put({false, {}, sample, 0});
 }
@@ -207,15 +206,12 @@ void LiveRecorder::write(double duration_s) {
         fmt::format("no picture came that can be stored, for {:g} s", duration_s + kMostWaiting_s);
   std::string unflushed;
   if (!copy_->flush(&unflushed) && error.empty()) error = unflushed;
-  const LiveRecording done = state();
+  LiveRecording done = state();
+  done.under_way = false;
+  done.error = error;
   {
     const std::lock_guard<std::mutex> lock(state_mutex_);
-    state_.under_way = false;
-    state_.error = error;
-    state_.length_s = done.length_s;
-    state_.frames = done.frames;
-    state_.samples = done.samples;
-    state_.left_out = done.left_out;
+    state_ = done;
     copy_.reset();  // closes the video
   }
   if (!error.empty()) spdlog::warn("recording: {}", error);

@@ -6,6 +6,7 @@
 // one; the counts are for any thread.
 
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <memory>
@@ -21,6 +22,9 @@ class StreamCopy;
 
 class RecordingCopy {
  public:
+  // Of telemetry from before the first stored frame, so many samples are stored.
+  static constexpr std::size_t kEarlySamples = 256;
+
   // Creates nothing yet. directory: of this recording alone.
   explicit RecordingCopy(std::string directory);
   ~RecordingCopy();
@@ -52,8 +56,6 @@ class RecordingCopy {
   [[nodiscard]] double length_s() const;
 
  private:
-  static constexpr std::size_t kEarlySamples = 256;
-
   const std::string directory_;
   const std::unique_ptr<StreamCopy> video_;
   RecordingWriter tables_;
