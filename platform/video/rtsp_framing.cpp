@@ -11,10 +11,9 @@ namespace {
 
 constexpr std::size_t kPacketHead = 4;  // bytes
 constexpr std::size_t kLargestPacket = 65'535;
-constexpr std::size_t kLeastPacket = 8;     // RTCP's shortest
-constexpr unsigned kMostChannels = 32;      // channels that were not agreed on
-constexpr std::size_t kMaxHead = 16 << 10;  // bytes of a message's first line and headers
-constexpr std::size_t kMaxHeadInGarbage = 2 << 10;
+constexpr std::size_t kLeastPacket = 8;             // RTCP's shortest
+constexpr unsigned kMostChannels = 32;              // channels that were not agreed on
+constexpr std::size_t kMaxHeadInGarbage = 2 << 10;  // bytes of a message that follows garbage
 
 // Possible starts of a camera's message.
 constexpr std::array<std::string_view, 12> kBeginnings = {

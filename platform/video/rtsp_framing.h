@@ -6,7 +6,8 @@
 //                                           have any byte but NUL
 // Line ends between packets and messages are ignored. Anything else is garbage, skipped byte by
 // byte up to a possible packet or message. A packet after garbage must be on one of the known
-// channels. No I/O; each byte is examined a few times; memory is bounded. One thread at a time.
+// channels. No I/O; a byte is examined a few times, one of garbage some hundred times; memory is
+// bounded. One thread at a time.
 
 #include <cstddef>
 #include <cstdint>
@@ -19,6 +20,7 @@ namespace alidade {
 class RtspFraming {
  public:
   static constexpr std::size_t kMaxMessage = 64 << 10;   // bytes, with its body
+  static constexpr std::size_t kMaxHead = 16 << 10;      // bytes of its first line and headers
   static constexpr std::size_t kMaxGarbage = 256 << 10;  // bytes in sequence
 
   struct Item {
@@ -46,8 +48,8 @@ class RtspFraming {
 
   // Bytes that belong to no packet and no message.
   [[nodiscard]] std::int64_t garbage() const { return garbage_; }
-  // True if some garbage started as a message longer than kMaxMessage, or with a head of more than
-  // 16 KiB.
+  // True if some garbage started as a message longer than kMaxMessage, or with a head longer than
+  // kMaxHead.
   [[nodiscard]] bool had_long_message() const { return had_long_message_; }
   // True after more than kMaxGarbage bytes of garbage in sequence: this is not RTSP, and parsing
   // has stopped.

@@ -195,8 +195,8 @@ bool RtspLink::is_rtsp(std::string* error) const {
   if (!framing_.is_lost() && (packets_ || framing_.garbage() == 0)) return true;
   *error = !packets_ && framing_.had_long_message()
                ? "the camera's answer is longer than " +
-                     std::to_string(RtspFraming::kMaxMessage >> 10U) +
-                     " KB, or its head than 16 KB: not a description"
+                     std::to_string(RtspFraming::kMaxMessage >> 10U) + " KB, or its head than " +
+                     std::to_string(RtspFraming::kMaxHead >> 10U) + " KB: not a description"
                : kNotRtsp;
   return false;
 }
