@@ -76,11 +76,15 @@ void read_path(Section& section, PathConfig* path) {
   section.number("period_s", &path->period, kPositive);
   section.number("stop_s", &path->stop, kNotNegative);
   section.number("focal_length_px", &path->focal_length, kPositive);
+  section.flag("follows_zoom", &path->follows_zoom);
   section.number("pan_deg", &path->pan, kAny, kDegree);
   section.number("tilt_deg", &path->tilt, kAny, kDegree);
   section.path("file", &path->file);
   if ((path->type == Type::kCsv) != !path->file.empty()) {
     section.fail("path needs 'file' with 'type: csv', and only then");
+  }
+  if (path->follows_zoom && (path->type == Type::kCsv || path->focal_length > 0)) {
+    section.fail("follows_zoom: neither 'type: csv' nor focal_length_px goes with it");
   }
   if (path->type == Type::kSweep && path->stop * 4 >= path->period) {
     section.fail("stop_s must be less than a quarter of period_s");
@@ -437,6 +441,9 @@ void read_config(Section& section, Config* config) {
   }
   if (std::abs(config->camera.line_delay) * config->image.height * config->image.rate_hz > 1) {
     section.fail("camera: reading out all rows (line_delay_us x height) outlasts a frame");
+  }
+  if (config->path.follows_zoom && !config->zoom) {
+    section.fail("path: follows_zoom needs a 'zoom' section");
   }
   if (config->pattern && config->zoom) section.fail("a pattern is seen without zoom");
   if (config->pattern && config->recording.images == RecordingConfig::Images::kNone) {

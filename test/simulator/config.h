@@ -75,6 +75,7 @@ struct PathConfig {
   double pan = 0, tilt = 0;  // rad, the centre
   // px, whose fields of view are meant; 0: the camera's, with a zoom the longest of its path.
   double focal_length = 0;
+  bool follows_zoom = false;  // fields of view at the present zoom are meant
   std::filesystem::path file;
 };
 

@@ -110,6 +110,18 @@ TEST_F(VirtualCameraConfig, NamesFileAndLineOfEveryMistake) {
                    "camera.yaml:1: path needs 'stops' with 'type: dwell', and only then"},
            Mistake{"zoom:\n  path:\n    type: dwell\n    stops: [{rest_s: 2}]\n",
                    "camera.yaml:4: a stop needs zoom or focal_length_px, and only one of them"},
+           Mistake{"zoom: {path: {type: sweep, round_s: 30}}\n",
+                   "camera.yaml:1: path: round_s goes with 'type: dwell' only"},
+           Mistake{
+               "zoom: {path: {type: dwell, round_s: 3, stops: [{zoom: 1, rest_s: 2}, {zoom: "
+               "9, rest_s: 2}]}}\n",
+               "camera.yaml:1: path: a round_s of 3 is too short for stops and movements, which "
+               "take 4.09769"},
+           Mistake{"path: {follows_zoom: true}\n",
+                   "camera.yaml:1: path: follows_zoom needs a 'zoom' section"},
+           Mistake{"zoom: {}\npath: {follows_zoom: true, focal_length_px: 900}\n",
+                   "camera.yaml:2: follows_zoom: neither 'type: csv' nor focal_length_px goes "
+                   "with it"},
            Mistake{"zoom: {path: {type: sweep, factor: 30}}\n",
                    "camera.yaml:1: path: a focal length of 36000 px is not between 1200 and 24000"},
            Mistake{"zoom: {path: {type: still, zoom: 0}}\n",

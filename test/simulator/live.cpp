@@ -277,6 +277,8 @@ void serve_live(const Config& given, const std::atomic<bool>& stop) {
         "clock_offset_ms must not exceed the telemetry's latency_ms: live video cannot arrive "
         "before it is captured");
   }
+  std::string error;
+  if (!VideoServer::validate(video_options(config), &error)) throw ConfigError(error);
   const std::unique_ptr<Path> path = make_path(config);
   Subject subject(config, *path);
   const auto frames = encoded_frames(config, subject, frames_to_render(config, subject), stop);

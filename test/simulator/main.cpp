@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <exception>
 #include <filesystem>
+#include <optional>
 #include <string>
 
 #include "test/simulator/config.h"
@@ -59,6 +60,10 @@ int run(int argc, char** argv) {
       "--size", size,
       "WIDTHxHEIGHT of the pictures in place of the configuration's, as 480x270: smaller "
       "ones are rendered sooner");
+  std::optional<double> duration;
+  app.add_option("--duration", duration,
+                 "seconds in place of the configuration's; 0: serve without end what repeats")
+      ->check(CLI::Range(0.0, 1e6));
   app.add_option("-o,--output", output,
                  "write a recording to this new directory; without it, serve");
   app.set_version_flag("--version", "alidade-simulate " ALIDADE_VERSION);
@@ -77,6 +82,7 @@ int run(int argc, char** argv) {
   // The folder of the examples may not be written.
   if (!example.empty()) config.truth_dir = "truth";
   if (!size.empty()) resize(size, &config);
+  if (duration) config.duration = *duration;
   if (output.empty()) {
     stop_on_signals();
     serve_live(config, stop_requested);

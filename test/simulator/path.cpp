@@ -9,6 +9,7 @@
 #include "test/simulator/path_table.h"
 #include "test/simulator/played_path.h"
 #include "test/simulator/random.h"
+#include "test/simulator/zoom.h"
 
 namespace alidade::simulator {
 namespace {
@@ -145,7 +146,44 @@ class Sampled : public Path {
   std::vector<Angles> points_;
 };
 
-std::unique_ptr<Path> make_exact_path(const Config& config) {
+// A path whose unit, the field of view, is that of the present zoom.
+class FollowsZoom : public Path {
+ public:
+  // `path` is drawn with one field of view, horizontal_field_of_view(config).
+  FollowsZoom(std::unique_ptr<Path> path, const Config& config)
+      : path_(std::move(path)),
+        zoom_(config),
+        image_(config.image),
+        centre_{config.path.pan, config.path.tilt},
+        field_(horizontal_field_of_view(config)),
+        duration_(config.duration) {}
+
+  Angles at(double time_s) const override {
+    const double scale = field_of_view(image_, zoom_.lens(time_s).focal_length) / field_;
+    const Angles drawn = path_->at(time_s);
+    return {centre_.pan + scale * (drawn.pan - centre_.pan),
+            centre_.tilt + scale * (drawn.tilt - centre_.tilt)};
+  }
+  double period_s() const override {
+    if (!zoom_.path().moves()) return path_->period_s();
+    const double turns = zoom_.period_s() / path_->period_s();
+    return std::abs(turns - std::round(turns)) < 1e-9 ? zoom_.period_s() : 0;
+  }
+  // What does not repeat never rests, but nobody asks beyond the recording.
+  Span moving() const override { return {-kMargin, duration_ + kMargin}; }
+
+ private:
+  static constexpr double kMargin = 10;  // s
+
+  std::unique_ptr<Path> path_;
+  Zoom zoom_;
+  ImageConfig image_;
+  Angles centre_;
+  double field_;
+  double duration_;
+};
+
+std::unique_ptr<Path> make_steady_path(const Config& config) {
   const double field = horizontal_field_of_view(config);
   switch (config.path.type) {
     case PathConfig::Type::kTripleCosine:
@@ -158,6 +196,12 @@ std::unique_ptr<Path> make_exact_path(const Config& config) {
       return std::make_unique<Sampled>(config.path.file);
   }
   throw std::logic_error("unknown path type");
+}
+
+std::unique_ptr<Path> make_exact_path(const Config& config) {
+  std::unique_ptr<Path> path = make_steady_path(config);
+  if (!config.path.follows_zoom) return path;
+  return std::make_unique<FollowsZoom>(std::move(path), config);
 }
 
 }  // namespace

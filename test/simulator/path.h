@@ -12,6 +12,8 @@
 //                  each, the last stop_s of each quarter at rest
 //   jerky          quick moves with rests between random points of that rectangle; repeats after T
 //   csv            columns time_s, pan_rad, tilt_rad (a truth.csv will do), cubic Hermite
+//
+// All but csv may follow the zoom: s is then the field of view of that moment.
 
 #include <memory>
 

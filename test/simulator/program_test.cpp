@@ -141,6 +141,10 @@ TEST(VirtualCameraProgram, ExplainsBadUsageAndBadConfigurationWithExitCodeTwo) {
   Child early({"-c", directory.write("b.yaml", "camera: {clock_offset_ms: 5}\nduration_s: 1\n")});
   EXPECT_THAT(early.read_line(), HasSubstr("cannot arrive before it is captured"));
   EXPECT_EQ(early.exit_code(), 2);
+  // Said before it draws, which takes minutes.
+  Child odd({"--example", "paper", "--size", "480x270"});
+  EXPECT_THAT(odd.read_line(), HasSubstr("JPEG only in multiples of 8 up to 2040, not 480x270"));
+  EXPECT_EQ(odd.exit_code(), 2);
 }
 
 TEST(VirtualCameraProgram, FailsWithExitCodeOneIfItCannotWrite) {

@@ -28,6 +28,9 @@ Zoom::Zoom(const Config& config)
       path_(make_zoom_path(config_)) {}
 
 double Zoom::slip(std::int64_t movement) const {
+  if (const std::int64_t round = path_->movements_per_round(); each_round_the_same() && round > 0) {
+    movement = (movement % round + round) % round;
+  }
   return config_.sigma_rep * normal_of(mix(seed_, static_cast<std::uint64_t>(movement))) +
          config_.backlash / 2 * path_->direction(movement);
 }

@@ -6,7 +6,7 @@
 // A lens does not come back exactly: each movement n leaves eps_n = N(0, sigma_rep^2) +- backlash / 2, + where it went to longer
 // focal lengths. During a movement eps goes from the one to the other in step with log f; the motor's limits are those of
 // f(z) alone. What is told is z in whole steps, `late` behind, and stands still in the intervals given.
-// Draws depend on seed and movement alone. Thread-safe, no allocation after construction.
+// Draws depend on seed and movement alone, or on the movement's place in the round if the path states how long one is. Thread-safe, no allocation after construction.
 
 #include <cstdint>
 #include <memory>
@@ -40,9 +40,13 @@ class Zoom {
   // Of the path, without eps, px.
   [[nodiscard]] ZoomConfig::Ends focal_lengths() const;
   // After how many seconds the lens does the same again; 0: never. Without a movement it is always the same.
-  [[nodiscard]] double period_s() const { return config_.sigma_rep > 0 ? 0 : path_->period_s(); }
+  [[nodiscard]] double period_s() const {
+    return config_.sigma_rep > 0 && !each_round_the_same() ? 0 : path_->period_s();
+  }
 
  private:
+  // A path that states its round is to repeat, eps too.
+  [[nodiscard]] bool each_round_the_same() const { return config_.path.round > 0; }
   [[nodiscard]] Lens lens_at(double part, double log_focal_length) const;
 
   ZoomConfig config_;

@@ -45,6 +45,7 @@ void read_zoom_path(Section& section, ZoomPathConfig* path) {
     }
     path->stops.push_back(stop);
   });
+  section.number("round_s", &path->round, kPositive);
   section.number("factor", &path->factor, kPositive);
   section.number("sweep_s", &path->duration, kPositive);
   section.number("stop_s", &path->stop, kNotNegative);
@@ -55,6 +56,9 @@ void read_zoom_path(Section& section, ZoomPathConfig* path) {
   }
   if ((path->type == Type::kDwell) != !path->stops.empty()) {
     section.fail("path needs 'stops' with 'type: dwell', and only then");
+  }
+  if (path->round > 0 && path->type != Type::kDwell) {
+    section.fail("path: round_s goes with 'type: dwell' only");
   }
 }
 

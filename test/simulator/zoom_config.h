@@ -22,6 +22,7 @@ struct ZoomPathConfig {
   Type type = Type::kStill;
   std::optional<double> reading;  // where still, sweep and creep begin; the wide end if not given
   std::vector<Stop> stops;        // of dwell
+  double round = 0;               // s, of dwell; 0: as long as stops and movements take
   double factor = 10;          // of the focal length, of sweep and creep; below 1 to a shorter one
   double duration = 5;         // s, of one sweep
   double stop = 1;             // s of rest after each sweep or creep

@@ -100,6 +100,9 @@ class ZoomMoves : public ZoomPath {
 
   double period_s() const override { return period_; }
   bool moves() const override { return !legs_.empty(); }
+  std::int64_t movements_per_round() const override {
+    return static_cast<std::int64_t>(legs_.size());
+  }
 
   int direction(std::int64_t movement) const override {
     if (legs_.empty()) return 1;
@@ -139,7 +142,13 @@ std::shared_ptr<const ZoomPath> make_dwell(const ZoomConfig& config, const ZoomC
     legs.push_back({time, from, to, move_at(std::abs(to - from), config.speed, config)});
     time += legs.back().move.duration();
   }
-  return std::make_shared<ZoomMoves>(places.front(), std::move(legs), time);
+  if (config.path.round > 0 && config.path.round < time) {
+    throw std::invalid_argument("path: a round_s of " + short_number(config.path.round) +
+                                " is too short for stops and movements, which take " +
+                                short_number(time));
+  }
+  return std::make_shared<ZoomMoves>(places.front(), std::move(legs),
+                                     std::max(time, config.path.round));
 }
 
 // There and back, a rest after each.
@@ -201,6 +210,7 @@ class SampledZoom : public ZoomPath {
 
   double period_s() const override { return 0; }
   bool moves() const override { return !movements_.empty(); }
+  std::int64_t movements_per_round() const override { return 0; }
 
   int direction(std::int64_t movement) const override {
     if (movements_.empty()) return 1;

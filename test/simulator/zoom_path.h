@@ -2,7 +2,8 @@
 // Where the zoom's motor stands at any time: movements and rests, in log f of the lens' own curve (zoom_curve.h).
 //
 //   still   at one reading
-//   dwell   rests at each stop, moving between them as fast as the motor can; after the last to the first again
+//   dwell   rests at each stop, moving between them as fast as the motor can; after the last to the first again, where it waits
+//           until the round is over
 //   sweep   the focal length times `factor` in `duration`, a rest, back, a rest
 //   creep   the same at a steady, slow rate
 //   csv     columns time_s, zoom: a monotone cubic of log f through the points (Fritsch and Carlson 1980); equal neighbours
@@ -46,6 +47,8 @@ class ZoomPath {
   [[nodiscard]] virtual bool moves() const = 0;
   // 1: a movement to longer focal lengths, -1: to shorter ones. That before the first: as that.
   [[nodiscard]] virtual int direction(std::int64_t movement) const = 0;
+  // Movements of a round; 0: there are no rounds.
+  [[nodiscard]] virtual std::int64_t movements_per_round() const = 0;
   // Least and most log f.
   [[nodiscard]] virtual ZoomConfig::Ends extent() const = 0;
 };

@@ -393,5 +393,44 @@ TEST(VirtualZoom, PathsFieldsOfViewAreThoseOfItsLongestFocalLengthUnlessTold) {
   EXPECT_NEAR(horizontal_field_of_view(config), 2 * std::atan(640 / 2000.0), 1e-12);
 }
 
+// As many fields of view to either side of the centre at whatever zoom there is.
+TEST(VirtualZoom, APathThatFollowsTheZoomTurnsByTheFieldsOfViewOfEachMoment) {
+  Config config = zooming_camera();
+  config.path = {};
+  config.path.pan = 1;
+  config.path.tilt = -0.2;
+  config.path.period = 10;
+  config.zoom->path.round = 20;
+  const auto steady = make_path(config);
+  config.path.follows_zoom = true;
+  const auto path = make_path(config);
+  const Zoom zoom(config);
+  EXPECT_EQ(path->period_s(), 20);
+  for (const double time : {0.5, 2.7, 6.1, 9.3, 15.0}) {
+    const double part = field_of_view(config.image, zoom.lens(time).focal_length) /
+                        field_of_view(config.image, 24000);
+    EXPECT_NEAR(path->at(time).pan - 1, part * (steady->at(time).pan - 1), 1e-12) << time;
+    EXPECT_NEAR(path->at(time).tilt + 0.2, part * (steady->at(time).tilt + 0.2), 1e-12) << time;
+    EXPECT_NEAR(path->at(time + 20).pan, path->at(time).pan, 1e-9) << time;
+  }
+  config.path.period = 7;  // no whole number of these makes a round of the zoom
+  EXPECT_EQ(make_path(config)->period_s(), 0);
+}
+
+TEST(VirtualZoom, ARoundThatIsStatedRepeatsWithAllThatIsRandom) {
+  Config config = zooming_camera();
+  config.zoom->sigma_rep = 0.01;
+  EXPECT_EQ(Zoom(config).period_s(), 0);
+  config.zoom->path.round = 30;
+  const Zoom zoom(config);
+  EXPECT_EQ(zoom.period_s(), 30);
+  for (const double time : {0.0, 3.0, 5.5, 29.0}) {
+    EXPECT_NEAR(zoom.lens(time + 60).focal_length, zoom.lens(time).focal_length, 1e-6) << time;
+  }
+  EXPECT_NE(zoom.slip(0), zoom.slip(1));
+  // It waits where it began.
+  EXPECT_EQ(zoom.reading(29), zoom.reading(29.9));
+}
+
 }  // namespace
 }  // namespace alidade::simulator

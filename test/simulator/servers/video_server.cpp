@@ -310,7 +310,20 @@ class RtpPusher {
   GObjectPtr<GstElement> pipeline_;
 };
 
-bool validate(const VideoServerOptions& options, std::string* error) {
+}  // namespace
+
+struct VideoServer::Impl {
+  explicit Impl(VideoServerOptions given) : options(std::move(given)) {
+    gst_init(nullptr, nullptr);
+  }
+
+  const VideoServerOptions options;
+  FrameInput input{options};
+  std::unique_ptr<RtspServer> rtsp;
+  std::unique_ptr<RtpPusher> rtp;
+};
+
+bool VideoServer::validate(const VideoServerOptions& options, std::string* error) {
   const std::string size = std::to_string(options.width) + "x" + std::to_string(options.height);
   if (options.width <= 0 || options.height <= 0) return fail(error, "no image size: " + size);
   // RFC 2435 counts in blocks of 8 px with one byte.
@@ -331,19 +344,6 @@ bool validate(const VideoServerOptions& options, std::string* error) {
   }
   return true;
 }
-
-}  // namespace
-
-struct VideoServer::Impl {
-  explicit Impl(VideoServerOptions given) : options(std::move(given)) {
-    gst_init(nullptr, nullptr);
-  }
-
-  const VideoServerOptions options;
-  FrameInput input{options};
-  std::unique_ptr<RtspServer> rtsp;
-  std::unique_ptr<RtpPusher> rtp;
-};
 
 VideoServer::VideoServer(VideoServerOptions options)
     : impl_(std::make_unique<Impl>(std::move(options))) {}

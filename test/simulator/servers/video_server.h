@@ -43,6 +43,9 @@ class VideoServer {
   VideoServer(const VideoServer&) = delete;
   VideoServer& operator=(const VideoServer&) = delete;
 
+  // Whether start() could take these options; if not, *error says why.
+  [[nodiscard]] static bool validate(const VideoServerOptions& options, std::string* error);
+
   // On failure says why in *error. May be called again after stop().
   [[nodiscard]] bool start(std::string* error);
 
