@@ -159,6 +159,12 @@ OrientationStepOptions step_options(const Config& config, const PublishedCalibra
   noise.pan_tilt_sigma = config.pan_tilt.angle_sigma_rad.value_or(noise.pan_tilt_sigma);
   noise.resolution = config.pan_tilt.angle_quantum_rad;
   noise.acceleration_sigma = config.pan_tilt.acceleration_sigma_rad_s2;
+  if (config.camera.focal_length_range) {
+    const Camera<double>& camera = calibration.calibration.camera;
+    options.any_zoom = data_sheet_calibration(config.camera);
+    options.any_zoom->camera.width = camera.width;
+    options.any_zoom->camera.height = camera.height;
+  }
   options.telemetry_limits.max_repeat_s = config.pan_tilt.max_repeat_s;
   options.telemetry_limits.max_extrapolation_s = config.realtime.max_extrapolation_s;
   return options;

@@ -28,7 +28,8 @@ std::unique_ptr<OeMode> make_oe_mode(const OeOptions& options) {
 }
 
 OrientationStep::OrientationStep(const OrientationStepOptions& options)
-    : has_telemetry_(options.has_telemetry),
+    : any_zoom_(options.any_zoom),
+      has_telemetry_(options.has_telemetry),
       follow_points_(options.follow_points),
       connections_sigma_s_(options.minimum_delay_sigma_s),
       video_clock_(options.video_clock, options.video_stamp_sigma_s, options.wait_for_pace),
@@ -254,15 +255,27 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
   return record;
 }
 
+// The head and the link stay what they are; the lens and where it points are open.
+Calibration OrientationStep::at_any_zoom() const {
+  Calibration out = *any_zoom_;
+  const Calibration& here = now_.calibration;
+  out.camera.aspect = here.camera.aspect;
+  out.mechanics = here.mechanics;
+  out.line_delay = here.line_delay;
+  out.clock_offset = here.clock_offset;
+  return out;
+}
+
 void OrientationStep::orient_between(const InterpolatedPanTilt* measured, double telemetry_time_s,
                                      OrientationRecord* record) {
   Calibration between;
-  // Lens and axes of another zoom cannot be used here.
-  if (!zoom_.calibration(now_.zoom_curve, telemetry_time_s, readout_s(), &between)) {
+  const bool known = zoom_.calibration(now_.zoom_curve, telemetry_time_s, readout_s(), &between);
+  if (!known) {
     record->status = RecordStatus::kOtherZoom;
-    return;
+    if (!any_zoom_) return;
+    between = at_any_zoom();
   }
-  record->calibrated = true;
+  record->calibrated = known;
   record->camera = pack(between);
   if (measured == nullptr) return;
   FrameOrientation frame;
@@ -272,7 +285,7 @@ void OrientationStep::orient_between(const InterpolatedPanTilt* measured, double
     return;
   }
   record->mode = RecordMode::kPt;
-  if (oe_) {
+  if (oe_ && known) {
     record->status = zoom_on_curve_ ? RecordStatus::kFocalLengthUnsure : RecordStatus::kZoomMoves;
   }
   record->orientation = orientation_of(frame);

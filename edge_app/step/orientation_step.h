@@ -62,6 +62,9 @@ struct OrientationStepOptions {
   // Device units: readings no further apart are one zoom. Empty: found from their jitter.
   std::optional<double> zoom_tolerance;
   ZoomCurve zoom_curve;  // for other zooms; may be empty
+  // Where neither calibration nor curve knows the zoom: PT mode with this lens and its covariance,
+  // and the calibration's axes and clock offset. Empty: no orientation there.
+  std::optional<Calibration> any_zoom;
   // s, one standard deviation: how much the delays of two connections usually differ.
   double minimum_delay_sigma_s = 5e-3;
   // s, the same for a connection whose delay has not been seen yet (link_delay.h).
@@ -203,8 +206,9 @@ class OrientationStep {
   // not on the zoom curve.
   [[nodiscard]] bool take_scene_lens(const ToldBase& told);
 
-  // PT mode's record by the zoom curve. measured null: the status already says why there is no
-  // angle.
+  [[nodiscard]] Calibration at_any_zoom() const;
+  // PT mode's record at another zoom, by the curve, else by at_any_zoom(). measured null: the status
+  // already says why there is no angle.
   void orient_between(const InterpolatedPanTilt* measured, double telemetry_time_s,
                       OrientationRecord* record);
   // s, from a frame's first row to its last.
@@ -214,6 +218,7 @@ class OrientationStep {
   void allow_for_begun_movement(Calibration* calibration) const;
 
   // As given.
+  std::optional<Calibration> any_zoom_;
   bool has_telemetry_;
   bool follow_points_;
   double connections_sigma_s_;  // s: how much the least delays of two connections differ

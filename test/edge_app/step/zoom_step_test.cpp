@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <memory>
@@ -133,6 +134,40 @@ TEST(ZoomStep, HasNoneBeyondTheCurveOrWithoutOne) {
     EXPECT_FALSE(record.orientation);
     EXPECT_FALSE(record.calibrated);
   }
+}
+
+// With the two ends of the data sheet: the head is known, the lens is not.
+TEST(ZoomStep, HasTheHeadsAnglesBeyondTheCurveWhereTheDataSheetKnowsTheZoom) {
+  OrientationStepOptions options = zooming_options();
+  Calibration sheet;
+  sheet.camera = options.calibration.camera;
+  sheet.camera.focal_length = 5000;
+  const int f = index(Parameter::kFocalLength);
+  const int axis = index(Parameter::kPanAxis0);
+  sheet.covariance(f, f) = 3000.0 * 3000.0;
+  sheet.covariance(axis, axis) = 0.05 * 0.05;
+  options.any_zoom = sheet;
+  OrientationStep step(options);
+  for (int i = 0; i < 25; ++i) step.add_telemetry(sample_at(kInterval_s * i, 3100));
+  const OrientationRecord record = frame_at(&step, 0.9);
+  EXPECT_EQ(record.status, RecordStatus::kOtherZoom);
+  EXPECT_EQ(record.mode, RecordMode::kPt);
+  EXPECT_FALSE(record.calibrated);
+  EXPECT_EQ(record.camera.focal_length, 5000);
+  ASSERT_TRUE(record.orientation);
+  // As at a zoom that is known, and less certain by the sheet's axes.
+  OrientationStep known(options);
+  for (int i = 0; i < 25; ++i) known.add_telemetry(sample_at(kInterval_s * i, 2100));
+  const OrientationRecord there = frame_at(&known, 0.9);
+  ASSERT_TRUE(there.orientation);
+  EXPECT_NEAR(record.orientation->pan_rad, there.orientation->pan_rad, 1e-9);
+  EXPECT_NEAR(record.orientation->tilt_rad, there.orientation->tilt_rad, 1e-9);
+  const auto largest = [](const OrientationRecord& of) {
+    const auto& sigma = of.orientation->sigma_rad;
+    return *std::max_element(sigma.begin(), sigma.end());
+  };
+  EXPECT_GT(largest(record), 2 * largest(there));
+  EXPECT_NEAR(focal_length_sigma(record), 3000, 1e-9);
 }
 
 // In the frame in which a lens leaves its zoom its reading is still that zoom's, by the tolerance.
