@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "core/model/angle.h"
@@ -70,9 +71,9 @@ std::vector<PairRows> of_kind(ReturnKind kind, const std::vector<SeenFrame>& fra
   return out;
 }
 
-// Those of the lens at which most frames were taken.
-std::vector<PairRows> at_one_zoom(const std::vector<SeenFrame>& frames,
-                                  const std::vector<PairRows>& pairs, std::size_t* reference) {
+// A frame of the lens at which most frames were taken. frames: not empty.
+std::size_t usual_zoom(const std::vector<SeenFrame>& frames) {
+  std::size_t reference = 0;
   std::vector<std::size_t> order(frames.size());
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
   std::sort(order.begin(), order.end(),
@@ -83,13 +84,22 @@ std::vector<PairRows> at_one_zoom(const std::vector<SeenFrame>& frames,
            log_f(frames[order[high]]) <= log_f(frames[order[low]]) + kSameZoom) {
       ++high;
     }
-    if (high - low > most) *reference = order[(low + high) / 2];
+    if (high - low > most) reference = order[(low + high) / 2];
     most = std::max(most, high - low);
   }
+  return reference;
+}
+
+bool is_at_zoom_of(const SeenFrame& frame, const SeenFrame& reference) {
+  return is_same_zoom(frame.by_telemetry, reference.by_telemetry);
+}
+
+std::vector<PairRows> at_one_zoom(const std::vector<SeenFrame>& frames,
+                                  const std::vector<PairRows>& pairs, const SeenFrame& reference) {
   std::vector<PairRows> out;
   for (const PairRows& pair : pairs) {
     const auto is_there = [&](std::size_t frame) {
-      return is_same_zoom(frames[frame].by_telemetry, frames[*reference].by_telemetry);
+      return is_at_zoom_of(frames[frame], reference);
     };
     if (is_there(pair.first) && is_there(pair.second)) out.push_back(pair);
   }
@@ -118,27 +128,39 @@ double motion_inflation(const VerifyInput& input, OrientationFrom from) {
   return std::max(1.0, of_frames / of_samples);
 }
 
+// Nothing if all frames are of one zoom.
+std::optional<JudgedZooms> judged_zooms(const std::vector<SeenFrame>& frames) {
+  if (frames.empty()) return std::nullopt;
+  const auto [least, most] = std::minmax_element(
+      frames.begin(), frames.end(),
+      [](const SeenFrame& a, const SeenFrame& b) { return log_f(a) < log_f(b); });
+  if (log_f(*most) - log_f(*least) <= kOtherZoom) return std::nullopt;
+  const SeenFrame& usual = frames[usual_zoom(frames)];
+  JudgedZooms out{std::exp(log_f(*least)), std::exp(log_f(*most)), std::exp(log_f(usual)), 0};
+  for (const SeenFrame& frame : frames) out.usual_frames += is_at_zoom_of(frame, usual) ? 1 : 0;
+  return out;
+}
+
 struct Extent {
   double pan = 0, tilt = 0;  // rad
   double reversals = 0;      // of either axis
 };
 
-Extent extent_of(const std::vector<SeenFrame>& frames) {
+// frames: not empty.
+Extent extent_of(const std::vector<const SeenFrame*>& frames) {
+  const auto angle = [](const SeenFrame* frame) { return frame->by_telemetry.angle; };
+  const auto [left, right] = std::minmax_element(
+      frames.begin(), frames.end(),
+      [&](const auto* a, const auto* b) { return angle(a).pan < angle(b).pan; });
+  const auto [low, high] = std::minmax_element(
+      frames.begin(), frames.end(),
+      [&](const auto* a, const auto* b) { return angle(a).tilt < angle(b).tilt; });
   Extent out;
-  if (frames.empty()) return out;
-  const auto [left, right] =
-      std::minmax_element(frames.begin(), frames.end(), [](const SeenFrame& a, const SeenFrame& b) {
-        return a.by_telemetry.angle.pan < b.by_telemetry.angle.pan;
-      });
-  const auto [low, high] =
-      std::minmax_element(frames.begin(), frames.end(), [](const SeenFrame& a, const SeenFrame& b) {
-        return a.by_telemetry.angle.tilt < b.by_telemetry.angle.tilt;
-      });
-  out.pan = right->by_telemetry.angle.pan - left->by_telemetry.angle.pan;
-  out.tilt = high->by_telemetry.angle.tilt - low->by_telemetry.angle.tilt;
+  out.pan = angle(*right).pan - angle(*left).pan;
+  out.tilt = angle(*high).tilt - angle(*low).tilt;
   for (std::size_t i = 1; i < frames.size(); ++i) {
-    if (frames[i].heading.pan * frames[i - 1].heading.pan < 0) ++out.reversals;
-    if (frames[i].heading.tilt * frames[i - 1].heading.tilt < 0) ++out.reversals;
+    if (frames[i]->heading.pan * frames[i - 1]->heading.pan < 0) ++out.reversals;
+    if (frames[i]->heading.tilt * frames[i - 1]->heading.tilt < 0) ++out.reversals;
   }
   return out;
 }
@@ -151,8 +173,13 @@ std::vector<std::string> advice_for(const VerifyInput& input, const Verification
                     kVerificationLeast_s));
     return out;
   }
-  const Extent extent = extent_of(input.frames);
-  const Camera<double>& camera = input.frames.front().by_telemetry.calibration.camera;
+  const SeenFrame& usual = input.frames[usual_zoom(input.frames)];
+  std::vector<const SeenFrame*> of_usual_zoom;
+  for (const SeenFrame& frame : input.frames) {
+    if (is_at_zoom_of(frame, usual)) of_usual_zoom.push_back(&frame);
+  }
+  const Extent extent = extent_of(of_usual_zoom);
+  const Camera<double>& camera = usual.by_telemetry.calibration.camera;
   const double width = camera.width / camera.focal_length;
   const double height = camera.height / camera.focal_length;
   if (extent.pan < kVerificationRangeLeast * width)
@@ -213,14 +240,15 @@ Verification verify(const VerifyInput& input) {
   out.by_telemetry = pair_rows(frames, pairs, OrientationFrom::kTelemetry);
   out.by_all_samples = pair_rows(frames, pairs, OrientationFrom::kAllSamples);
   out.pairs = static_cast<int>(out.by_telemetry.size());
+  out.zooms = judged_zooms(frames);
   constexpr int kKinds = static_cast<int>(ReturnKind::kCount);
   const int of_known = input.known.empty() ? 0 : 2;
   out.chance_limit = kFalseAlarms / (2 * kKinds + kDepartureCount + of_known);
   const double log_limit = std::log(out.chance_limit);
   if (!out.by_telemetry.empty()) {
-    std::size_t reference = 0;
-    const std::vector<PairRows> one_zoom = at_one_zoom(frames, out.by_all_samples, &reference);
-    const Calibration& calibration = frames[reference].by_telemetry.calibration;
+    const SeenFrame& reference = frames[usual_zoom(frames)];
+    const std::vector<PairRows> one_zoom = at_one_zoom(frames, out.by_all_samples, reference);
+    const Calibration& calibration = reference.by_telemetry.calibration;
     const ModelCheckResult model =
         check_model(frames, one_zoom, calibration, input.telemetry_error,
                     motion_inflation(input, OrientationFrom::kAllSamples), log_limit);

@@ -75,6 +75,13 @@ struct VerifyInput {
   TurnSigma turn_sigma = {};             // of the platform against the known directions' axes
 };
 
+// Focal lengths of a recording that zooms, px.
+struct JudgedZooms {
+  double least_px = 0, most_px = 0;  // of the compared pictures
+  double usual_px = 0;               // at which most of them were taken: `model` is of these alone
+  int usual_frames = 0;              // their number
+};
+
 struct Verification {
   Verdict verdict = Verdict::kNotJudged;
   std::string sentence;                 // the verdict in words
@@ -82,6 +89,7 @@ struct Verification {
   int pairs = 0;                        // of pictures
   int places = 0;                       // see ModelCheckResult
   double noise_ratio = 1;               // see ModelCheckResult
+  std::optional<JudgedZooms> zooms;     // empty: one zoom
   double chance_limit = 0;              // a comparison less probable than this contradicts; 0 to 1
   std::vector<ClaimComparison> claims;  // each kind for landmarks, then for telemetry; may be empty
   std::vector<ModelComparison> model;   // each departure; empty as claims: there are no pairs

@@ -113,6 +113,12 @@ std::string verification_json(const Verification& verification,
   json["places"] = verification.places;
   json["picture_noise_ratio"] = verification.noise_ratio;
   json["chance_limit"] = verification.chance_limit;
+  if (const auto& zooms = verification.zooms) {
+    json["zooms"] = {{"least_px", zooms->least_px},
+                     {"most_px", zooms->most_px},
+                     {"model_px", zooms->usual_px},
+                     {"model_frames", zooms->usual_frames}};
+  }
   json["returns"] = ordered_json::array();
   for (const ClaimComparison& claim : verification.claims)
     json["returns"].push_back(to_json(claim));

@@ -326,8 +326,16 @@ std::string summary_of(const Verification& v) {
   return "contradicted: " + joined(parts);
 }
 
+std::string sentence_of(const JudgedZooms& zooms) {
+  return fmt::format(
+      "returns: of pictures at f {:.0f} to {:.0f} px; each departure below: of the {} pictures at "
+      "f {:.0f} px, as most are of this zoom",
+      zooms.least_px, zooms.most_px, zooms.usual_frames, zooms.usual_px);
+}
+
 std::string verification_text(const Verification& verification) {
   std::string out = fmt::format("{}\n", verification.sentence);
+  if (verification.zooms) out += fmt::format("  {}\n", sentence_of(*verification.zooms));
   for (const ClaimComparison& comparison : verification.claims) {
     if (comparison.result.pairs > 0) out += fmt::format("  {}\n", comparison.sentence);
   }

@@ -25,6 +25,7 @@ namespace alidade {
 [[nodiscard]] std::string sentence_of(const ModelComparison& comparison,
                                       const std::vector<DepartureTest>& found);
 [[nodiscard]] std::string sentence_of(const KnownComparison& comparison);
+[[nodiscard]] std::string sentence_of(const JudgedZooms& zooms);
 // The verdict, with the number that matters and the likeliest causes.
 [[nodiscard]] std::string summary_of(const Verification& verification);
 

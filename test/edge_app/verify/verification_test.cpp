@@ -40,6 +40,30 @@ TEST(Verification, OfAHeadAtRestAsksForMotion) {
   EXPECT_THAT(verification_text(verification), HasSubstr("advice: pan over 3.7 degrees"));
 }
 
+// The advice is for the zoom with most pictures: a range at the wide end would be none at the tele end.
+TEST(Verification, SaysWhichZoomItsDeparturesAreOf) {
+  std::vector<SeenFrame> frames(7);
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    FrameOrientation& is = frames[i].by_telemetry;
+    is.mode = OrientationMode::kPt;
+    is.calibration.camera = {i < 2 ? 100.0 : 1000.0, 1, {}, 64, 48};
+    is.angle.pan = i < 2 ? static_cast<double>(i) : 0.01 * static_cast<double>(i);
+    frames[i].by_all_samples = is;
+    frames[i].luma.assign(64 * 48, 100);
+  }
+  const Verification verification = verify({"film", "lens.yaml", frames, {}, 1e-4, 20});
+  const std::string text = verification_text(verification);
+  EXPECT_THAT(text, HasSubstr("returns: of pictures at f 100 to 1000 px"));
+  EXPECT_THAT(text, HasSubstr("of the 5 pictures at f 1000 px"));
+  EXPECT_THAT(text, HasSubstr("advice: tilt over 2.8 degrees"));
+  EXPECT_THAT(text, Not(HasSubstr("advice: pan over")));
+  const auto json = nlohmann::json::parse(verification_json(verification, {}));
+  EXPECT_EQ(json["zooms"]["model_frames"], 5);
+  EXPECT_NEAR(json["zooms"]["most_px"].get<double>(), 1000, 1e-9);
+  const std::string page = verification_report(verification, {"film", "1", "today"});
+  EXPECT_THAT(page, HasSubstr("of the 5 pictures at f 1000 px"));
+}
+
 TEST(Verification, HasJsonAndAPageWithEscapedNames) {
   Verification verification;
   verification.sentence = "not judged: <nothing>";
