@@ -22,6 +22,7 @@ using internal::HoldPriorCost;
 using internal::kPictureBlock;
 using internal::LensBendCost;
 using internal::LensLevelCost;
+using internal::MotionPriorCost;
 using internal::PicturePriorCost;
 using internal::SeenCost;
 
@@ -33,6 +34,7 @@ constexpr double kKeptOrientation_rad = 1e-7;
 struct MapUnknowns {
   std::vector<Vector4<double>> pictures;  // xi, eps
   std::vector<Vector3<double>> d_start;
+  std::vector<Vector4<double>> motions;    // change of the pictures' motions
   std::vector<Vector2<double>> landmarks;  // change of d_start
   LensCurve lens;
 };
@@ -47,9 +49,17 @@ bool is_usable(const MapEvidence& evidence, const MapOptions& options) {
         options.hold_sigma > 0)) {
     return false;
   }
+  const std::vector<LensQuantities>& sigmas = options.level_sigmas;
+  if (!sigmas.empty() &&
+      (sigmas.size() != static_cast<std::size_t>(options.lens.control_points()) ||
+       !std::all_of(sigmas.begin(), sigmas.end(),
+                    [](const LensQuantities& sigma) { return (sigma.array() > 0).all(); }))) {
+    return false;
+  }
   for (const MapPicture& picture : evidence.pictures) {
     if (!std::isfinite(picture.position) || !(picture.eps_sigma > 0) ||
         !all_finite(picture.R_start) || !all_finite(picture.motion.angular_velocity) ||
+        !(picture.motion_sigma.array() >= 0).all() || !all_finite(picture.motion_sigma) ||
         picture.position < options.lens.begin_s() || picture.position > options.lens.end_s()) {
       return false;
     }
@@ -119,12 +129,18 @@ std::vector<bool> tied(const MapEvidence& evidence, const MapUnknowns& state,
   return used;
 }
 
+// Whether the picture's motion is adjusted. Without a line delay it is not seen.
+bool has_open_motion(const MapPicture& picture) {
+  return picture.motion.line_delay != 0 && !picture.motion_sigma.isZero(0);
+}
+
 // The problem and its parameter blocks, in the order of elimination.
 struct MapProblem {
   ceres::Problem problem;
   std::vector<double*> landmarks;
-  std::vector<double*> shared;  // pictures, then control points, then hold
+  std::vector<double*> shared;  // pictures, control points, hold, motions that are adjusted
   std::size_t pictures = 0;
+  std::size_t hold = 0;  // its place in `shared`
   std::vector<ceres::ResidualBlockId> seen;
 
   [[nodiscard]] std::size_t unknowns() const {
@@ -143,6 +159,7 @@ std::unique_ptr<MapProblem> build_problem(const MapEvidence& evidence, const Map
   for (int i = 0; i < lens.control_points(); ++i) {
     out->shared.push_back(lens.control_point(i).data());
   }
+  out->hold = out->shared.size();
   out->shared.push_back(&lens.hold());
   std::vector<bool> has_landmark(state->landmarks.size(), false);
   for (std::size_t i = 0; i < used.size(); ++i) {
@@ -161,8 +178,8 @@ std::unique_ptr<MapProblem> build_problem(const MapEvidence& evidence, const Map
         new ceres::HuberLoss(kBend_sigmas * noise),
         {state->pictures[at].data(), state->landmarks[landmark].data(),
          lens.control_point(first).data(), lens.control_point(first + 1).data(),
-         lens.control_point(first + 2).data(), lens.control_point(first + 3).data(),
-         &lens.hold()}));
+         lens.control_point(first + 2).data(), lens.control_point(first + 3).data(), &lens.hold(),
+         state->motions[at].data()}));
   }
   const bool is_tied_to_base =
       std::any_of(evidence.pictures.begin(), evidence.pictures.end(),
@@ -176,12 +193,25 @@ std::unique_ptr<MapProblem> build_problem(const MapEvidence& evidence, const Map
     }
     problem.AddResidualBlock(new PicturePriorCost(picture.R_start, prior, picture.eps_sigma),
                              nullptr, state->pictures[i].data());
+    double* const motion = state->motions[i].data();
+    problem.AddResidualBlock(new MotionPriorCost(picture.motion_sigma), nullptr, motion);
+    if (has_open_motion(picture)) {
+      out->shared.push_back(motion);
+    } else {
+      problem.SetParameterBlockConstant(motion);
+    }
   }
   for (int i = 0; i < lens.control_points(); ++i) {
-    problem.AddResidualBlock(new LensLevelCost(options.lens.control_point(i), options.level_sigma),
-                             nullptr, lens.control_point(i).data());
+    const LensQuantities& level = options.lens.control_point(i);
+    const LensQuantities& sigma = options.level_sigmas.empty()
+                                      ? options.level_sigma
+                                      : options.level_sigmas[static_cast<std::size_t>(i)];
+    problem.AddResidualBlock(new LensLevelCost(level, sigma), nullptr,
+                             lens.control_point(i).data());
     if (i < 2) continue;
-    problem.AddResidualBlock(new LensBendCost(options.bend_sigma), nullptr,
+    const LensQuantities bend =
+        options.lens.control_point(i - 2) - 2 * options.lens.control_point(i - 1) + level;
+    problem.AddResidualBlock(new LensBendCost(bend, options.bend_sigma), nullptr,
                              lens.control_point(i - 2).data(), lens.control_point(i - 1).data(),
                              lens.control_point(i).data());
   }
@@ -197,12 +227,12 @@ bool solve(const MapOptions& options, double least_gain, MapProblem* map, bool* 
   solver.linear_solver_type = ceres::SPARSE_SCHUR;
   auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
   for (double* block : map->landmarks) ordering->AddElementToGroup(block, 0);
-  // Within a group Ceres orders by address. So control points and hold have groups of their own, to
-  // be the same each time.
-  for (std::size_t i = 0; i + 1 < map->shared.size(); ++i) {
-    ordering->AddElementToGroup(map->shared[i], i < map->pictures ? 1 : 2);
+  // Within a group Ceres orders by address. So each kind has a group of its own, to be the same each
+  // time.
+  for (std::size_t i = 0; i < map->shared.size(); ++i) {
+    const int group = i < map->pictures ? 1 : i < map->hold ? 2 : i == map->hold ? 3 : 4;
+    ordering->AddElementToGroup(map->shared[i], group);
   }
-  ordering->AddElementToGroup(map->shared.back(), 3);
   solver.linear_solver_ordering = ordering;
   solver.max_num_iterations = options.max_steps;
   solver.num_threads = std::max(1, options.threads);
@@ -227,7 +257,7 @@ std::vector<double> squares_of(const MapEvidence& evidence, const MapOptions& op
     const auto landmark = static_cast<std::size_t>(seen.landmark);
     const MapPicture& picture = evidence.pictures[at];
     const int first = options.lens.basis_at(picture.position).segment;
-    const double* parameters[7] = {
+    const double* parameters[8] = {
         state.pictures[at].data(),
         state.landmarks[landmark].data(),
         state.lens.control_point(first).data(),
@@ -235,6 +265,7 @@ std::vector<double> squares_of(const MapEvidence& evidence, const MapOptions& op
         state.lens.control_point(first + 2).data(),
         state.lens.control_point(first + 3).data(),
         &hold,
+        state.motions[at].data(),
     };
     Vector2<double> r;
     const bool is_seen = state.d_start[landmark].norm() > 0.5 &&
@@ -312,7 +343,7 @@ bool shared_covariance(MapProblem* map, Eigen::MatrixXd* covariance, double* noi
 // Derivative of the pictures' (xi, log f) by the shared unknowns. There xi is of R_start Exp(xi),
 // here of R Exp(xi).
 Eigen::SparseMatrix<double> pictures_by_shared(const MapEvidence& evidence,
-                                               const MapUnknowns& state) {
+                                               const MapUnknowns& state, Eigen::Index shared) {
   const auto pictures = static_cast<Eigen::Index>(evidence.pictures.size());
   std::vector<Eigen::Triplet<double>> entries;
   for (Eigen::Index i = 0; i < pictures; ++i) {
@@ -330,9 +361,7 @@ Eigen::SparseMatrix<double> pictures_by_shared(const MapEvidence& evidence,
       entries.emplace_back(row + 3, column, basis.weight[k]);
     }
   }
-  Eigen::SparseMatrix<double> out(
-      kPictureBlock * pictures,
-      kPictureBlock * pictures + kLensQuantityCount * state.lens.control_points() + 1);
+  Eigen::SparseMatrix<double> out(kPictureBlock * pictures, shared);
   out.setFromTriplets(entries.begin(), entries.end());
   return out;
 }
@@ -356,6 +385,9 @@ void write_result(const MapEvidence& evidence, const std::vector<bool>& used,
     adjusted.R_base_from_camera = picture.R_start * exp_so3(Vector3<double>(x.head<3>()));
     adjusted.eps = x[3];
     adjusted.camera = state.lens.camera_at(picture.position, x[3]);
+    adjusted.motion = picture.motion;
+    adjusted.motion.angular_velocity += state.motions[i].head<3>();
+    adjusted.motion.zoom_rate += state.motions[i][3];
     out->pictures.push_back(adjusted);
   }
   out->landmarks.assign(state.landmarks.size(), Vector3<double>::Zero());
@@ -392,6 +424,7 @@ MapAdjustment adjust_map(const MapEvidence& evidence, const MapOptions& options)
   if (!is_usable(evidence, options)) return out;
   MapUnknowns state;
   state.pictures.assign(evidence.pictures.size(), Vector4<double>::Zero());
+  state.motions.assign(evidence.pictures.size(), Vector4<double>::Zero());
   state.landmarks.assign(static_cast<std::size_t>(evidence.landmarks), Vector2<double>::Zero());
   state.lens = options.start.value_or(options.lens);
   std::vector<bool> agrees;
@@ -435,9 +468,10 @@ MapAdjustment adjust_map(const MapEvidence& evidence, const MapOptions& options)
   if (!shared_covariance(map.get(), &covariance, &out.noise_scale)) return out;
   out.status = MapStatus::kNotConverged;
   if (!converged) return out;
-  const Eigen::SparseMatrix<double> G = pictures_by_shared(evidence, state);
+  const Eigen::SparseMatrix<double> G = pictures_by_shared(evidence, state, covariance.cols());
   const double inflation = std::max(1.0, out.noise_scale * out.noise_scale);
-  out.hold_sigma = std::sqrt(inflation * covariance(covariance.rows() - 1, covariance.cols() - 1));
+  const auto hold = static_cast<Eigen::Index>(kPictureBlock * map->hold);  // all before are of 4
+  out.hold_sigma = std::sqrt(inflation * covariance(hold, hold));
   out.covariance = inflation * (G * covariance * G.transpose());
   write_result(evidence, used, state, &out);
   out.status = MapStatus::kOk;

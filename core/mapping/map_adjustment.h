@@ -1,9 +1,11 @@
 #pragma once
 // adjust_map(): bundle adjustment of all pictures of a map, at all zooms, with one lens. Unknowns:
-// R_i at the reference row and eps_i of picture i, direction d_j of landmark j, lens
+// R_i at the reference row, motion m_i and eps_i of picture i, direction d_j of landmark j, lens
 // (lens_curve.h).
 //   sum rho(|u_ij - project(R_i, lens(s_i, eps_i), d_j)|^2 / sigma_ij^2)             rho: Huber's
 // + |Log(Rp_i^T R_i)|^2 by cov_p, with telemetry Rp  + (eps_i / sigma_eps_i)^2 + priors of the lens
+// + ((m_i - telemetry's) / sigma_m_i)^2: rates with noise, taken as exact, would shorten all f, as
+//   the read-out of a moving picture shows f times the rate
 // All pictures must be connected by landmarks, else the result names the groups. If no picture has
 // telemetry, the first picture's orientation is kept. Equal input gives equal results on one
 // thread. Allocates (4 pictures + lens)^2 numbers of covariance. Method: docs/derivations.md.
@@ -27,7 +29,9 @@ struct MapPicture {
   double position = 0;  // s of the lens curve: log f by the zoom reading
   // Sigma of log f about the curve: the zoom's repeatability, or the uncertainty of s. > 0.
   double eps_sigma = 1e-3;
-  PictureMotion motion;
+  PictureMotion motion;  // by telemetry
+  // Sigma of its angular velocity, rad/s, and zoom rate, 1/s. All 0: exact.
+  Vector4<double> motion_sigma = Vector4<double>::Zero();
   Matrix3<double> R_start = Matrix3<double>::Identity();  // start value of R_base_from_camera
   std::optional<OrientationPrior> telemetry;
 };
@@ -50,10 +54,12 @@ struct MapOptions {
   // Start value, with the same knots; without it `lens`.
   std::optional<LensCurve> start;
   // Prior sigmas of a control point's delta, kappa, c_u, c_v about `lens`, and of second
-  // differences of neighbouring control points.
+  // differences of neighbouring control points, likewise about those of `lens`.
   static_assert(kDistortionCount == 1, "a sigma for each quantity");
   LensQuantities level_sigma{0.05, 0.1, 30, 30};
   LensQuantities bend_sigma{0.02, 0.02, 3, 3};
+  // One for each control point, in place of level_sigma; empty: level_sigma for all.
+  std::vector<LensQuantities> level_sigmas;
   double hold_sigma = 0.5;  // of the lens's hold, about the hold of `lens`
   // rad; an observation whose direction at the start lies farther than this from those of its
   // landmark's other observations is not used.
@@ -78,6 +84,7 @@ struct AdjustedPicture {
   Matrix3<double> R_base_from_camera = Matrix3<double>::Identity();  // at the reference row
   double eps = 0;                                                    // of log f
   Camera<double> camera;
+  PictureMotion motion;
 };
 
 // Other members than status, groups and steps only with kOk.

@@ -207,9 +207,9 @@ class Building {
       Vector3<double> d;
       MapProjection seen;
       const Vector2<double> u = feature(of_b).u;
-      if (unproject_to_map(pose_a.camera, kept(at_a).motion, pose_a.R_base_from_camera,
-                           feature(of_a).u, &d) != ProjectionStatus::kOk ||
-          project_from_map(pose_b.camera, kept(at_b).motion, pose_b.R_base_from_camera, u.y(), d,
+      if (unproject_to_map(pose_a.camera, pose_a.motion, pose_a.R_base_from_camera, feature(of_a).u,
+                           &d) != ProjectionStatus::kOk ||
+          project_from_map(pose_b.camera, pose_b.motion, pose_b.R_base_from_camera, u.y(), d,
                            &seen) != ProjectionStatus::kOk) {
         continue;
       }
@@ -309,8 +309,10 @@ class Building {
       const LinkedPicture& picture = kept(i);
       MapPicture p;
       p.position = picture.log_f;
-      p.eps_sigma = options_.repeatability;
+      const MapView& view = views_[static_cast<std::size_t>(kept_[i])];
+      p.eps_sigma = std::max(options_.repeatability, view.log_f_sigma);
       p.motion = picture.motion;
+      p.motion_sigma = view.motion_sigma;
       p.R_start = adjusted ? found_.pictures[i].R_base_from_camera : R_[i];
       if (picture.R_base_from_camera) {
         p.telemetry =

@@ -28,11 +28,16 @@ struct MapView {
   std::optional<double> zoom;  // reading, device units
   // f in px, from zoom reading and data sheet or calibration; all pictures have it, or none has.
   std::optional<double> log_f;
+  // Sigma of log_f's own error, as of a reading between those that were calibrated. What is below
+  // MapBuildOptions::repeatability counts as that.
+  double log_f_sigma = 0;
   std::optional<PanTilt<double>> telemetry;  // measured angles, rad
   // Sigma of the orientation by telemetry, rad: noise, backlash, uncertainty of the axes.
   double angle_sigma = 1e-3;
   Vector3<double> angular_velocity = Vector3<double>::Zero();  // camera frame, rad/s
   double zoom_rate = 0;                                        // d log f / dt, 1/s
+  // Sigma of both: rad/s three times, 1/s. All 0: exact.
+  Vector4<double> motion_sigma = Vector4<double>::Zero();
 };
 
 struct MapBuildOptions {
@@ -40,7 +45,8 @@ struct MapBuildOptions {
   int height = 0;                              // px, of all pictures
   double line_delay = 0;                       // s/row
   std::optional<Mechanics<double>> mechanics;  // empty: not known; telemetry is not used
-  std::optional<LensCurve> lens;  // of an earlier calibration; its range must contain all log_f
+  // Of an earlier calibration (lens_prior.h); its range must contain all log_f.
+  std::optional<LensCurve> lens;
   // Sigma of log_f before the adjustment: error of the data sheet.
   double log_f_sigma = 0.02;
   double repeatability = 1e-3;  // sigma of log f after a movement of the zoom

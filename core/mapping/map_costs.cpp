@@ -37,9 +37,12 @@ bool SeenCost::Evaluate(double const* const* parameters, double* residuals,
   Matrix<double, 3, 2> J_d;
   const Vector3<double> d = direction_plus(
       *d_start_, Vector2<double>(Eigen::Map<const Vector2<double>>(parameters[1])), &J_d);
+  PictureMotion motion = picture_->motion;
+  motion.angular_velocity += Eigen::Map<const Vector3<double>>(parameters[7]);
+  motion.zoom_rate += parameters[7][3];
   MapProjection seen;
-  if (project_from_map(camera, picture_->motion, picture_->R_start * exp_so3(xi), u_.y(), d,
-                       &seen) != ProjectionStatus::kOk) {
+  if (project_from_map(camera, motion, picture_->R_start * exp_so3(xi), u_.y(), d, &seen) !=
+      ProjectionStatus::kOk) {
     return false;
   }
   Eigen::Map<Vector2<double>> out(residuals);
@@ -62,6 +65,10 @@ bool SeenCost::Evaluate(double const* const* parameters, double* residuals,
   if (jacobians[6] != nullptr) {
     Eigen::Map<Vector2<double>> J(jacobians[6]);
     J = seen.J_u_camera * by.J_hold / sigma_px_;
+  }
+  if (jacobians[7] != nullptr) {
+    JacobianRows<2, kMotionBlock> J(jacobians[7]);
+    J = seen.J_u_motion / sigma_px_;
   }
   return true;
 }
@@ -95,6 +102,22 @@ bool PicturePriorCost::Evaluate(double const* const* parameters, double* residua
   return true;
 }
 
+MotionPriorCost::MotionPriorCost(const Vector4<double>& sigma) {
+  constexpr double kLeast = 1e-6;  // rad/s, 1/s
+  information_ = sigma.cwiseMax(kLeast).cwiseInverse();
+}
+
+bool MotionPriorCost::Evaluate(double const* const* parameters, double* residuals,
+                               double** jacobians) const {
+  Eigen::Map<Vector4<double>> out(residuals);
+  out = Eigen::Map<const Vector4<double>>(parameters[0]).cwiseProduct(information_);
+  if (jacobians != nullptr && jacobians[0] != nullptr) {
+    JacobianRows<kMotionBlock, kMotionBlock> J(jacobians[0]);
+    J = information_.asDiagonal();
+  }
+  return true;
+}
+
 bool LensLevelCost::Evaluate(double const* const* parameters, double* residuals,
                              double** jacobians) const {
   Eigen::Map<LensQuantities> out(residuals);
@@ -109,7 +132,7 @@ bool LensLevelCost::Evaluate(double const* const* parameters, double* residuals,
 bool LensBendCost::Evaluate(double const* const* parameters, double* residuals,
                             double** jacobians) const {
   constexpr double kWeights[3] = {1, -2, 1};
-  LensQuantities bend = LensQuantities::Zero();
+  LensQuantities bend = -bend_;
   for (int i = 0; i < 3; ++i) bend += kWeights[i] * Eigen::Map<const LensQuantities>(parameters[i]);
   Eigen::Map<LensQuantities> out(residuals);
   out = bend.cwiseQuotient(sigma_);

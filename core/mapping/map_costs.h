@@ -1,6 +1,6 @@
 #pragma once
 // The terms of map_adjustment.h as Ceres cost functions with Jacobians. Parameter blocks: of a
-// picture (xi, eps) with R = R_start Exp(xi); of a landmark the change of its start direction; of
+// picture (xi, eps) with R = R_start Exp(xi), and the change of its motion (w, zoom rate); of a landmark the change of its start direction; of
 // the lens its control points, and hold. SeenCost fails if the landmark has no pixel, the others
 // never.
 
@@ -11,12 +11,13 @@
 namespace alidade::internal {
 
 inline constexpr int kPictureBlock = 4;
+inline constexpr int kMotionBlock = 4;
 
-// Parameters: picture, landmark, the four control points at the picture's position, hold. Residual:
-// error over sigma.
+// Parameters: picture, landmark, the four control points at the picture's position, hold, motion.
+// Residual: error over sigma.
 class SeenCost
     : public ceres::SizedCostFunction<2, kPictureBlock, 2, kLensQuantityCount, kLensQuantityCount,
-                                      kLensQuantityCount, kLensQuantityCount, 1> {
+                                      kLensQuantityCount, kLensQuantityCount, 1, kMotionBlock> {
  public:
   // All arguments except the observation must outlive this object, and must not change. Only knots,
   // image size and aspect of the lens are used, not its control points, which may change.
@@ -48,6 +49,18 @@ class PicturePriorCost : public ceres::SizedCostFunction<4, kPictureBlock> {
   double eps_sigma_;
 };
 
+// The change of a picture's motion over its sigma.
+class MotionPriorCost : public ceres::SizedCostFunction<kMotionBlock, kMotionBlock> {
+ public:
+  // sigma: an entry below what a picture can show counts as that.
+  explicit MotionPriorCost(const Vector4<double>& sigma);
+  bool Evaluate(double const* const* parameters, double* residuals,
+                double** jacobians) const override;
+
+ private:
+  Vector4<double> information_;  // 1 / sigma
+};
+
 // (x - level) / sigma
 class LensLevelCost : public ceres::SizedCostFunction<kLensQuantityCount, kLensQuantityCount> {
  public:
@@ -60,16 +73,17 @@ class LensLevelCost : public ceres::SizedCostFunction<kLensQuantityCount, kLensQ
   LensQuantities level_, sigma_;
 };
 
-// (x_a - 2 x_b + x_c) / sigma
+// (x_a - 2 x_b + x_c - bend) / sigma
 class LensBendCost : public ceres::SizedCostFunction<kLensQuantityCount, kLensQuantityCount,
                                                      kLensQuantityCount, kLensQuantityCount> {
  public:
-  explicit LensBendCost(const LensQuantities& sigma) : sigma_(sigma) {}
+  LensBendCost(const LensQuantities& bend, const LensQuantities& sigma)
+      : bend_(bend), sigma_(sigma) {}
   bool Evaluate(double const* const* parameters, double* residuals,
                 double** jacobians) const override;
 
  private:
-  LensQuantities sigma_;
+  LensQuantities bend_, sigma_;
 };
 
 // (hold - level) / sigma

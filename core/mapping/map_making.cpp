@@ -56,8 +56,8 @@ class MapMaking {
         if (taken[i][k]) continue;
         const PictureFeature f{static_cast<int>(i), static_cast<int>(k)};
         Vector3<double> d;
-        if (unproject_to_map(pose.camera, picture(i).motion, pose.R_base_from_camera, feature(f).u,
-                             &d) == ProjectionStatus::kOk) {
+        if (unproject_to_map(pose.camera, pose.motion, pose.R_base_from_camera, feature(f).u, &d) ==
+            ProjectionStatus::kOk) {
           add_landmark(d, {f});
         }
       }
@@ -83,8 +83,8 @@ class MapMaking {
     MapProjection seen;
     CameraColumn<double> J_camera_log;
     (void)found_.lens.camera_of(std::log(pose.camera.focal_length), &J_camera_log);
-    if (project_from_map(pose.camera, picture(at).motion, pose.R_base_from_camera, u.y(), d_b,
-                         &seen) != ProjectionStatus::kOk) {
+    if (project_from_map(pose.camera, pose.motion, pose.R_base_from_camera, u.y(), d_b, &seen) !=
+        ProjectionStatus::kOk) {
       return Matrix2<double>::Identity();
     }
     const Matrix2<double> J_u_tangent = seen.J_u_d * tangent_basis(d_b);
@@ -109,8 +109,8 @@ class MapMaking {
       const Feature& seen = feature(f);
       const AdjustedPicture& pose = found_.pictures[at];
       MapProjection there;
-      if (project_from_map(pose.camera, picture(at).motion, pose.R_base_from_camera, seen.u.y(),
-                           d_b, &there) != ProjectionStatus::kOk) {
+      if (project_from_map(pose.camera, pose.motion, pose.R_base_from_camera, seen.u.y(), d_b,
+                           &there) != ProjectionStatus::kOk) {
         return;
       }
       const Matrix2<double> J = there.J_u_d * tangent_basis(d_b);
@@ -158,8 +158,8 @@ class MapMaking {
     k.R_base_from_camera = Eigen::Quaterniond(pose.R_base_from_camera).normalized();
     k.eps = pose.eps;
     k.covariance = symmetric(found_.covariance_of(static_cast<int>(i)));
-    k.angular_velocity = view.angular_velocity;
-    k.zoom_rate = view.zoom_rate;
+    k.angular_velocity = pose.motion.angular_velocity;
+    k.zoom_rate = pose.motion.zoom_rate;
     return k;
   }
 
@@ -180,7 +180,7 @@ std::vector<std::optional<double>> errors_px(const MapEvidence& evidence,
     const MapObservation& seen = evidence.observations[i];
     const auto at = static_cast<std::size_t>(seen.picture);
     MapProjection there;
-    if (used[i] && project_from_map(found.pictures[at].camera, evidence.pictures[at].motion,
+    if (used[i] && project_from_map(found.pictures[at].camera, found.pictures[at].motion,
                                     found.pictures[at].R_base_from_camera, seen.u.y(),
                                     found.landmarks[static_cast<std::size_t>(seen.landmark)],
                                     &there) == ProjectionStatus::kOk) {

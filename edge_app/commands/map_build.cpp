@@ -12,6 +12,7 @@
 #include <optional>
 
 #include "core/mapping/keyframe_choice.h"
+#include "core/mapping/lens_prior.h"
 #include "core/mapping/map_building.h"
 #include "core/model/recording_needs.h"
 #include "edge_app/commands/command.h"
@@ -150,11 +151,38 @@ std::vector<Chosen> choose(const std::vector<MapRecording>& recordings,
   return out;
 }
 
-// A calibration knows the focal length better than the pictures of a map do: over a narrow range
-// of angles only the perspective within each picture shows it, and small errors of the pictures
-// feign that. So it stays within its sigma, and what temperature and focus do to a lens from day to
-// day. How far a movement of the zoom misses its reading is `repeatability`.
-void hold_focal_length(const PublishedCalibration& known, MapBuildOptions* build) {
+// The whole lens over the zooms of the views. Nothing if a view is not of this calibration, as one
+// of an older map that another one made.
+std::optional<LensPrior> prior_of(const PublishedCalibration& known,
+                                  const std::vector<MapView>& views, double spacing, double held) {
+  constexpr double kOneZoom = 0.01;  // of log f
+  const auto by_log_f = [](const MapView& a, const MapView& b) { return *a.log_f < *b.log_f; };
+  if (!std::all_of(views.begin(), views.end(), [](const MapView& view) { return view.log_f; }))
+    return std::nullopt;
+  const auto [least, most] = std::minmax_element(views.begin(), views.end(), by_log_f);
+  LensPrior prior;
+  if (known.zoom_curve.empty()) {
+    prior = lens_prior(known.calibration, held);
+  } else if (!least->zoom || !most->zoom) {
+    return std::nullopt;
+  } else if (*most->log_f - *least->log_f < kOneZoom) {
+    Calibration there;
+    if (!known.zoom_curve.at(*least->zoom, &there)) return std::nullopt;
+    prior = lens_prior(there, held);
+  } else {
+    prior = lens_prior(known.zoom_curve, *least->zoom, *most->zoom, spacing, held);
+  }
+  const bool covers = prior.lens.begin_s() <= *least->log_f && *most->log_f <= prior.lens.end_s();
+  return covers ? std::optional(prior) : std::nullopt;
+}
+
+// A calibration knows the lens better than the pictures of a map do: over a narrow range of angles
+// only the perspective within each picture shows the focal length, and an error of the distortion
+// feigns that. So the focal length stays within its sigma, and what temperature and focus do to a
+// lens from day to day. How far a movement of the zoom misses its reading is `repeatability`.
+// views: of all pictures.
+void hold_lens(const PublishedCalibration& known, const std::vector<MapView>& views,
+               MapBuildOptions* build) {
   constexpr double kFromDayToDay = 1e-4;  // of f
   double sigma = 0;
   if (known.zoom_curve.empty()) sigma = relative_focal_length_sigma(known.calibration);
@@ -167,6 +195,10 @@ void hold_focal_length(const PublishedCalibration& known, MapBuildOptions* build
   const double held = std::hypot(kFromDayToDay, sigma);
   for (double* prior : {&build->adjustment.level_sigma[0], &build->adjustment.bend_sigma[0]})
     *prior = std::min(*prior, held);
+  const std::optional<LensPrior> prior = prior_of(known, views, build->lens_spacing, held);
+  if (!prior) return;
+  build->lens = prior->lens;
+  build->adjustment.level_sigmas = prior->sigmas;
 }
 
 // The existing map, with the pictures of its keyframes; empty without a path.
@@ -184,6 +216,20 @@ SceneMap map_to_add(const std::string& path, const MapBuildOptions& build) {
   return map;
 }
 
+MapView view_of(const SceneKeyframe& k, double angle_sigma) {
+  MapView view;
+  view.recording = k.recording;
+  view.frame = k.frame;
+  view.time_utc_s = k.time_utc_s;
+  view.zoom = k.zoom;
+  view.log_f = k.position;
+  view.telemetry = k.telemetry;
+  view.angle_sigma = angle_sigma;
+  view.angular_velocity = k.angular_velocity;
+  view.zoom_rate = k.zoom_rate;
+  return view;
+}
+
 // Adds the keyframes of `map`. Their features are found anew, as a map stores only those that
 // became landmarks.
 void add_keyframes(const SceneMap& map, double angle_sigma, const FeatureDetector& detector,
@@ -196,18 +242,9 @@ void add_keyframes(const SceneMap& map, double angle_sigma, const FeatureDetecto
       spdlog::warn("keyframe {} of the map to add has no picture, and is left out", k.id);
       continue;
     }
-    MapView view;
-    view.recording = k.recording;
-    view.frame = k.frame;
-    view.time_utc_s = k.time_utc_s;
-    view.zoom = k.zoom;
-    view.log_f = k.position;
-    view.telemetry = k.telemetry;
-    view.angle_sigma = angle_sigma;
-    view.angular_velocity = k.angular_velocity;
-    view.zoom_rate = k.zoom_rate;
     builder->add(
-        view, features_of(detector, {picture.luma, picture.width, picture.height, picture.stride}),
+        view_of(k, angle_sigma),
+        features_of(detector, {picture.luma, picture.width, picture.height, picture.stride}),
         k.picture);
   }
 }
@@ -300,8 +337,14 @@ int build_map(const MapBuildCommand& options) {
                                    calibration->name, known->camera.width, known->camera.height,
                                    build.width, build.height));
   }
-  const FocalLengthKnowledge focal_lengths = focal_length_knowledge(
-      options.focal_length, known, calibration ? calibration->zoom_curve : ZoomCurve(), readings);
+  // Without a reading a zoom curve knows no focal length; the pictures tell it.
+  const bool by_pictures = options.no_telemetry && options.focal_length.empty() &&
+                           known != nullptr && !calibration->zoom_curve.empty();
+  const FocalLengthKnowledge focal_lengths =
+      by_pictures
+          ? FocalLengthKnowledge()
+          : focal_length_knowledge(options.focal_length, known,
+                                   calibration ? calibration->zoom_curve : ZoomCurve(), readings);
   build.mechanics = known != nullptr ? known->mechanics : Mechanics<double>();
   if (known != nullptr) build.line_delay = known->line_delay;
   build.largest_part = options.largest_part;
@@ -325,12 +368,18 @@ int build_map(const MapBuildCommand& options) {
                              "covers; leave it out, or record telemetry with zoom");
     }
   }
-  if (known != nullptr && options.focal_length.empty()) hold_focal_length(*calibration, &build);
+  const SceneMap there = map_to_add(options.add, build);
+  const double angle_sigma = views.front().front().angle_sigma;
+  if (known != nullptr && options.focal_length.empty() && !by_pictures) {
+    std::vector<MapView> all;
+    for (const std::vector<MapView>& some : views) all.insert(all.end(), some.begin(), some.end());
+    for (const SceneKeyframe& k : there.keyframes) all.push_back(view_of(k, angle_sigma));
+    hold_lens(*calibration, all, &build);
+  }
   Progress progress;
   MapBuilder builder(build);
   const FeatureDetector detector;
-  const SceneMap there = map_to_add(options.add, build);
-  add_keyframes(there, views.front().front().angle_sigma, detector, &builder);
+  add_keyframes(there, angle_sigma, detector, &builder);
   Pace pace;
   pace.is_known = known != nullptr;
   pace.readout_s = std::abs(build.line_delay) * build.height;

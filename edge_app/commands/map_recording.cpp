@@ -2,10 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <limits>
+#include <numeric>
 #include <optional>
 
 #include "core/calibration/number_text.h"
@@ -35,31 +37,131 @@ constexpr double kUnknownClock_s = 1;
 constexpr double kUnknownReadOut_s = 0.03;
 constexpr double kLineDelayShare = 0.02;
 
-// Telemetry, interpolated linearly at a time.
+constexpr double kTimeError_s = 3e-3;  // of a stamp that is not filtered
+
+// Telemetry at a time.
 struct Telling {
-  PanTilt<double> measured;  // rad
+  PanTilt<double> measured;  // rad, interpolated linearly
   PanTilt<double> rate;      // rad/s
+  double rate_sigma = 0;     // rad/s, of both
   std::optional<double> zoom;
-  double zoom_rate = 0;  // device units/s
+  double zoom_rate = 0;        // device units/s
+  double zoom_rate_sigma = 0;  // likewise
 };
 
-std::optional<Telling> telling_at(const std::vector<PanTiltSample>& samples, double time_s) {
-  const auto after =
+// A cubic through the samples around a time. Two samples alone would give a rate with all of their
+// noise; the cubic still follows a head that turns about.
+struct RateFit {
+  Vector2<double> rate = Vector2<double>::Zero();          // rad/s, of pan and tilt
+  Vector2<double> acceleration = Vector2<double>::Zero();  // rad/s^2
+  double rate_share = 0;                                   // sigma of a rate / sigma of an angle
+  double residual = 0;                                     // rad, root mean square of one angle
+};
+
+// Nothing if there are too few samples near that time.
+std::optional<RateFit> fit_rates(const std::vector<PanTiltSample>& samples, std::size_t after,
+                                 double time_s) {
+  constexpr std::size_t kEachSide = 5;
+  constexpr double kMostAway_s = 0.25;
+  constexpr int kPowers = 4;
+  constexpr Eigen::Index kLeast = 7;
+  const std::size_t first = after > kEachSide ? after - kEachSide : 0;
+  const std::size_t last = std::min(samples.size(), after + kEachSide);
+  std::vector<std::size_t> near;
+  for (std::size_t i = first; i < last; ++i) {
+    if (std::abs(samples[i].latest_time_s - time_s) <= kMostAway_s) near.push_back(i);
+  }
+  const auto rows = static_cast<Eigen::Index>(near.size());
+  if (rows < kLeast) return std::nullopt;
+  Eigen::Matrix<double, Eigen::Dynamic, kPowers> A(rows, kPowers);
+  Eigen::Matrix<double, Eigen::Dynamic, 2> angles(rows, 2);
+  const PanTilt<double> from{samples[near.front()].pan_rad, samples[near.front()].tilt_rad};
+  for (Eigen::Index i = 0; i < rows; ++i) {
+    const PanTiltSample& sample = samples[near[static_cast<std::size_t>(i)]];
+    const double t = sample.latest_time_s - time_s;
+    A.row(i) << 1, t, t * t, t * t * t;
+    angles.row(i) = minus(PanTilt<double>{sample.pan_rad, sample.tilt_rad}, from).transpose();
+  }
+  const Eigen::ColPivHouseholderQR<Eigen::Matrix<double, Eigen::Dynamic, kPowers>> qr(A);
+  if (qr.rank() < kPowers) return std::nullopt;
+  const Eigen::Matrix<double, kPowers, 2> c = qr.solve(angles);
+  const Eigen::Matrix<double, kPowers, kPowers> covariance = (A.transpose() * A).inverse();
+  RateFit out;
+  out.rate = c.row(1);
+  out.acceleration = 2 * c.row(2);
+  out.rate_share = std::sqrt(std::max(0.0, covariance(1, 1)));
+  const double freedom = 2 * static_cast<double>(rows - kPowers);
+  out.residual = std::sqrt((A * c - angles).squaredNorm() / freedom);
+  return out;
+}
+
+// rad, of one angle: about such cubics, without the worst of them.
+double angle_noise(const std::vector<PanTiltSample>& samples) {
+  constexpr double kKept = 0.95;
+  std::vector<double> squares;
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    const auto fit = fit_rates(samples, i, samples[i].latest_time_s);
+    if (fit) squares.push_back(fit->residual * fit->residual);
+  }
+  if (squares.empty()) return 0;
+  std::sort(squares.begin(), squares.end());
+  squares.resize(std::max<std::size_t>(
+      1, static_cast<std::size_t>(kKept * static_cast<double>(squares.size()))));
+  const double sum = std::accumulate(squares.begin(), squares.end(), 0.0);
+  return std::sqrt(sum / static_cast<double>(squares.size()));
+}
+
+// Rates of the samples a and a + 1; nothing at the ends and of samples at one time.
+std::optional<Vector2<double>> rate_between(const std::vector<PanTiltSample>& samples,
+                                            std::size_t a) {
+  if (a + 1 >= samples.size()) return std::nullopt;
+  const double span = samples[a + 1].latest_time_s - samples[a].latest_time_s;
+  if (!(span > 0)) return std::nullopt;
+  const PanTilt<double> from{samples[a].pan_rad, samples[a].tilt_rad};
+  return minus({samples[a + 1].pan_rad, samples[a + 1].tilt_rad}, from) / span;
+}
+
+std::optional<double> zoom_rate_between(const std::vector<PanTiltSample>& samples, std::size_t a) {
+  if (a + 1 >= samples.size() || !samples[a].zoom || !samples[a + 1].zoom) return std::nullopt;
+  const double span = samples[a + 1].latest_time_s - samples[a].latest_time_s;
+  if (!(span > 0)) return std::nullopt;
+  return (*samples[a + 1].zoom - *samples[a].zoom) / span;
+}
+
+std::optional<Telling> telling_at(const MapRecording& recording, double time_s) {
+  const std::vector<PanTiltSample>& samples = recording.telemetry;
+  const auto next =
       std::upper_bound(samples.begin(), samples.end(), time_s,
                        [](double t, const PanTiltSample& s) { return t < s.latest_time_s; });
-  if (after == samples.begin() || after == samples.end()) return std::nullopt;
-  const PanTiltSample& a = *std::prev(after);
-  const PanTiltSample& b = *after;
+  if (next == samples.begin() || next == samples.end()) return std::nullopt;
+  const auto after = static_cast<std::size_t>(next - samples.begin());
+  const PanTiltSample& a = samples[after - 1];
+  const PanTiltSample& b = samples[after];
   const double span = b.latest_time_s - a.latest_time_s;
   const double part = span > 0 ? (time_s - a.latest_time_s) / span : 0;
   const PanTilt<double> from{a.pan_rad, a.tilt_rad};
-  const Vector2<double> way = minus({b.pan_rad, b.tilt_rad}, from);
   Telling out;
-  out.measured = plus(from, Vector2<double>(part * way));
-  if (span > 0) out.rate = {way.x() / span, way.y() / span};
-  if (a.zoom && b.zoom) {
+  out.measured = plus(from, Vector2<double>(part * minus({b.pan_rad, b.tilt_rad}, from)));
+  if (const auto fit = fit_rates(samples, after, time_s)) {
+    out.rate = {fit->rate.x(), fit->rate.y()};
+    out.rate_sigma = std::hypot(fit->rate_share * std::max(recording.angle_noise, fit->residual),
+                                kTimeError_s * fit->acceleration.cwiseAbs().maxCoeff());
+  } else if (const auto here = rate_between(samples, after - 1)) {
+    // Few samples: how much the rate changes to the intervals beside is how little is known.
+    out.rate = {here->x(), here->y()};
+    out.rate_sigma = std::sqrt(2.0) * recording.angle_noise / span;
+    for (const std::size_t beside : {std::max<std::size_t>(after, 2) - 2, after}) {
+      if (const auto there = rate_between(samples, beside))
+        out.rate_sigma = std::max(out.rate_sigma, (*there - *here).cwiseAbs().maxCoeff());
+    }
+  }
+  if (const auto here = zoom_rate_between(samples, after - 1)) {
     out.zoom = *a.zoom + part * (*b.zoom - *a.zoom);
-    if (span > 0) out.zoom_rate = (*b.zoom - *a.zoom) / span;
+    out.zoom_rate = *here;
+    for (const std::size_t beside : {std::max<std::size_t>(after, 2) - 2, after}) {
+      if (const auto there = zoom_rate_between(samples, beside))
+        out.zoom_rate_sigma = std::max(out.zoom_rate_sigma, std::abs(*there - *here));
+    }
   } else if (a.zoom || b.zoom) {
     out.zoom = a.zoom ? a.zoom : b.zoom;
   }
@@ -173,6 +275,7 @@ MapRecording load_map_recording(const std::string& directory, bool with_telemetr
                        return a.latest_time_s < b.latest_time_s;
                      });
     steady_zoom(std::nullopt, &out.telemetry);
+    out.angle_noise = angle_noise(out.telemetry);
   }
   return out;
 }
@@ -185,10 +288,11 @@ MapView map_view(const MapRecording& recording, const FrameStamp& frame,
   view.time_utc_s = frame.sender_utc_s.value_or(0);
   const Calibration nominal;
   const Calibration& c = calibration != nullptr ? *calibration : nominal;
-  const auto told =
-      telling_at(recording.telemetry, telemetry_time_of(recording, frame, calibration));
+  const auto told = telling_at(recording, telemetry_time_of(recording, frame, calibration));
   const auto f = known.at(told ? told->zoom : std::nullopt);
   if (f) view.log_f = f->log_f;
+  // A data sheet's error is common to all pictures, and not meant here.
+  if (f && calibration != nullptr) view.log_f_sigma = f->sigma;
   if (!told) return view;
   view.zoom = told->zoom;
   view.telemetry = told->measured;
@@ -196,10 +300,13 @@ MapView map_view(const MapRecording& recording, const FrameStamp& frame,
   const Mechanics<double> mechanics = calibration != nullptr ? c.mechanics : Mechanics<double>();
   view.angular_velocity = angular_velocity(mechanics, true_from_measured(mechanics, told->measured),
                                            true_from_measured(mechanics, told->rate));
+  view.motion_sigma.head<3>().setConstant(told->rate_sigma);
   if (told->zoom && told->zoom_rate != 0) {
     constexpr double kStep_s = 1e-3;
     const auto later = known.at(*told->zoom + kStep_s * told->zoom_rate);
     if (f && later) view.zoom_rate = (later->log_f - f->log_f) / kStep_s;
+    view.log_f_sigma = std::hypot(view.log_f_sigma, kTimeError_s * view.zoom_rate);
+    view.motion_sigma[3] = std::abs(view.zoom_rate / told->zoom_rate) * told->zoom_rate_sigma;
   }
   return view;
 }

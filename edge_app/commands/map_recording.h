@@ -55,6 +55,7 @@ struct MapRecording {
   RecordingInfo info;
   std::vector<FrameStamp> frames;
   std::vector<PanTiltSample> telemetry;  // by latest_time_s; empty: none, or not wanted
+  double angle_noise = 0;                // rad, of one angle, by the telemetry itself
 
   // Device units, in order of time. Samples without a reading are left out.
   [[nodiscard]] std::vector<double> zoom_readings() const;

@@ -143,6 +143,46 @@ TEST(MapAdjustment, IsAsGoodAsItSaysAndLeavesOutWhatIsWrong) {
   EXPECT_LT(sum / freedom, 1.03 + wide);
 }
 
+// Rates by telemetry have noise: taken as exact, it shortens every focal length, as the read-out of a moving picture shows
+// the rate times f. Here it is half a pixel over the height of a picture.
+TEST(MapAdjustment, RatesThatAreNoisyAreAsGoodAsTheySay) {
+  constexpr int kMaps = 4;
+  constexpr double kFields = 0.02;  // sigma of a rate, fields of view a second
+  double sum = 0, sum_if_exact = 0;
+  double told_off = 0, found_off = 0;  // (rad/s)^2, of turns across the view
+  for (std::uint64_t seed = 11; seed < 11 + kMaps; ++seed) {
+    SmallMap map = small_map(seed, 0);
+    std::mt19937_64 random(seed);
+    std::normal_distribution<double> normal;
+    for (std::size_t i = 0; i < map.truth.size(); ++i) {
+      const double sigma = kFields * map.truth[i].width / map.truth[i].focal_length;
+      MapPicture& picture = map.evidence.pictures[i];
+      picture.motion.angular_velocity +=
+          sigma * Eigen::Vector3d(normal(random), normal(random), normal(random));
+      picture.motion.zoom_rate += kFields * normal(random);
+      picture.motion_sigma << sigma, sigma, sigma, kFields;
+    }
+    const MapAdjustment found = adjust_map(map.evidence, small_options());
+    ASSERT_EQ(found.status, MapStatus::kOk) << to_string(found.status);
+    sum += square_of_all(map, found);
+    for (std::size_t i = 0; i < map.truth.size(); ++i) {
+      const Vector3<double> told = map.evidence.pictures[i].motion.angular_velocity;
+      const Vector3<double> truth = map.truth[i].knowledge(true).motion.angular_velocity;
+      told_off += (told - truth).head<2>().squaredNorm();
+      found_off += (found.pictures[i].motion.angular_velocity - truth).head<2>().squaredNorm();
+    }
+    for (MapPicture& picture : map.evidence.pictures) picture.motion_sigma.setZero();
+    const MapAdjustment if_exact = adjust_map(map.evidence, small_options());
+    if (if_exact.status == MapStatus::kOk) sum_if_exact += square_of_all(map, if_exact);
+  }
+  const double freedom = 72.0 * kMaps;
+  const double wide = 4 * std::sqrt(2 / freedom);
+  EXPECT_GT(sum / freedom, 1 - wide);
+  EXPECT_LT(sum / freedom, 1.03 + wide);
+  EXPECT_LT(found_off, 0.25 * told_off) << "pictures that share landmarks show their turns";
+  EXPECT_GT(sum_if_exact / freedom, 2) << "a noise that could not tell proves nothing";
+}
+
 // One kind of lens keeps the distortion in the corner where it rests off its curve, another keeps k.
 TEST(MapAdjustment, FindsOutWhatALensKeepsThatRestsOffItsCurve) {
   constexpr int kMaps = 8;

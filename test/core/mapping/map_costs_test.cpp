@@ -64,7 +64,7 @@ TEST(MapCosts, WhatIsSeenHasTheNumericJacobians) {
     seen.sigma_px = 0.2;
     const internal::SeenCost cost(&picture, &lens, &d, seen);
     using Block = Eigen::Vector4d;
-    std::array<Block, 7> values;
+    std::array<Block, 8> values;
     const auto vary = [&](double a, double b, double c, double e) {
       return Block(a * normal(random), b * normal(random), c * normal(random), e * normal(random));
     };
@@ -72,12 +72,14 @@ TEST(MapCosts, WhatIsSeenHasTheNumericJacobians) {
     values[1] = vary(10 / f, 10 / f, 0, 0);
     for (std::size_t i = 2; i < 6; ++i) values.at(i) = vary(0.01, 0.03, 5, 5);
     values[6] = vary(1, 0, 0, 0);
-    std::array<Block, 7> steps;
+    values[7] = vary(0.02, 0.02, 0.02, 0.05);
+    std::array<Block, 8> steps;
     steps[0] = Block(1 / f, 1 / f, 1e-3, 1e-3);
     steps[1] = Block::Constant(1 / f);
     for (std::size_t i = 2; i < 6; ++i) steps.at(i) = Block(1e-3, 1e-3, 1, 1);
     steps[6] = Block::Constant(1e-1);
-    expect_jacobians<2, 4, 7>(cost, values, steps, 5e-14 * f + 1e-10);
+    steps[7] = Block::Constant(1e-2);
+    expect_jacobians<2, 4, 8>(cost, values, steps, 5e-14 * f + 1e-10);
   }
 }
 
@@ -114,8 +116,10 @@ TEST(MapCosts, TheLensesPriorsHaveTheNumericJacobians) {
   const Eigen::Vector4d step(1e-3, 1e-2, 1, 1);
   const Eigen::Vector4d x(0.02, -0.1, 4, 2);
   expect_jacobians<4, 4, 1>(internal::LensLevelCost({0.01, 0, 1, 1}, sigma), {x}, {step}, 1e-12);
-  expect_jacobians<4, 4, 3>(internal::LensBendCost(sigma), {x, 2 * x, -x}, {step, step, step},
-                            1e-12);
+  expect_jacobians<4, 4, 3>(internal::LensBendCost({0.01, 0, 1, 1}, sigma), {x, 2 * x, -x},
+                            {step, step, step}, 1e-12);
+  expect_jacobians<4, 4, 1>(internal::MotionPriorCost({0.01, 0.02, 0, 0.3}), {x},
+                            {Eigen::Vector4d::Constant(1e-3)}, 1e-6);
   expect_jacobians<1, 1, 1>(internal::HoldPriorCost(0.5, 0.3), {Matrix<double, 1, 1>(0.9)},
                             {Matrix<double, 1, 1>(1e-1)}, 1e-12);
 }
