@@ -77,8 +77,19 @@ void judge_scale(MotionReport* report, const MotionNeeds& needs) {
   constexpr double kGuess = 0.2;
   constexpr double kCalibrated = 0.1;
   if (!report->focal_length_px || !(needs.focal_length_px > 0)) return;
-  const double factor = *report->focal_length_px / needs.focal_length_px;
+  const double nearest_px = std::clamp(*report->focal_length_px, needs.focal_length_px,
+                                       needs.tele_px.value_or(needs.focal_length_px));
+  const double factor = *report->focal_length_px / nearest_px;
   if (std::abs(factor - 1) <= (needs.calibrated ? kCalibrated : kGuess)) return;
+  if (needs.tele_px) {
+    add_problem(&report->findings,
+                fmt::format("{}: the picture moves as if the focal length were {:.0f} px, but "
+                            "{:.0f} to {:.0f} px are given; correct camera.focal_length_px: wide "
+                            "and tele are the zoom's two ends, in pixels of this picture",
+                            needs.focal_length_from, *report->focal_length_px,
+                            needs.focal_length_px, *needs.tele_px));
+    return;
+  }
   add_problem(
       &report->findings,
       fmt::format("{}: the picture moves as if the focal length were {:.0f} px, {:.2f} times the "

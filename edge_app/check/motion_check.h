@@ -22,7 +22,8 @@ struct MotionNeeds {
   std::string source;             // of pan and tilt
   std::string video;              // of the image
   int image_width_px = 0;         // 0: unknown
-  double focal_length_px = 0;     // 0: unknown
+  double focal_length_px = 0;     // 0: unknown; of a zoom without calibration: the wide end's
+  std::optional<double> tele_px;  // of such a zoom: the tele end's
   std::string focal_length_from;  // where focal_length_px comes from, for people
   bool calibrated = false;
   double clock_offset_s = 0;  // of the calibration, else 0

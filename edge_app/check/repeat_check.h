@@ -18,7 +18,7 @@ namespace alidade {
 
 struct RepeatNeeds {
   std::string video;           // of the image
-  double focal_length_px = 0;  // from the calibration or the data sheet
+  double focal_length_px = 0;  // from the calibration or the data sheet; the least it may be
 };
 
 struct RepeatReport {

@@ -160,6 +160,12 @@ std::string milliseconds(const Spread& spread) {
 
 }  // namespace
 
+std::optional<std::int64_t> missing_frames(const std::vector<CheckedFrame>& frames) {
+  const std::vector<double> steps = intervals(frames);
+  bool by_times = false;
+  return lost_frames(frames, steps, spread_of(steps), &by_times);
+}
+
 VideoReport check_video(const std::vector<CheckedFrame>& frames,
                         const FrameSourceCounters& counters, const FrameSourceCounters& at_start,
                         const ClockFilterOptions& clock, const VideoNeeds& needs) {

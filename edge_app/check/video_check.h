@@ -58,6 +58,9 @@ struct VideoReport {
   Findings findings;
 };
 
+// How many frames are missing between those that came, as described above. Empty: not known.
+[[nodiscard]] std::optional<std::int64_t> missing_frames(const std::vector<CheckedFrame>& frames);
+
 // at_start: the part of `counters` from the first seconds. A relay or camera may begin with a burst
 // of kept pictures, which overflows the queues of any machine once.
 [[nodiscard]] VideoReport check_video(const std::vector<CheckedFrame>& frames,

@@ -6,12 +6,16 @@
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <optional>
 #include <string>
+#include <system_error>
 #include <unordered_map>
 #include <vector>
 
@@ -64,6 +68,13 @@ std::string scale_advice(const PanTiltConfig& pan_tilt) {
   }
 }
 
+// px; of a zoom that no calibration knows, its wide end's.
+double least_focal_length(const PublishedCalibration& calibration, const Config& config) {
+  return !calibration.calibrated && config.camera.focal_length_range
+             ? config.camera.focal_length_range->wide_px
+             : calibration.calibration.camera.focal_length;
+}
+
 MotionReport motion_of(const Measured& measured, const VideoReport& video,
                        const TelemetryReport& telemetry, const Config& config,
                        const PublishedCalibration& calibration) {
@@ -79,7 +90,9 @@ MotionReport motion_of(const Measured& measured, const VideoReport& video,
   needs.source = measured.pan_tilt.name;
   needs.video = measured.video.name;
   needs.image_width_px = video.width;
-  needs.focal_length_px = calibration.calibration.camera.focal_length;
+  needs.focal_length_px = least_focal_length(calibration, config);
+  if (!calibration.calibrated && config.camera.focal_length_range)
+    needs.tele_px = config.camera.focal_length_range->tele_px;
   needs.focal_length_from = calibration.calibrated ? calibration.name : "camera.focal_length_px";
   needs.calibrated = calibration.calibrated;
   needs.clock_offset_s = calibration.calibrated ? calibration.calibration.clock_offset : 0;
@@ -257,6 +270,33 @@ void check_lens_prior(const Config& config, const Camera<double>& camera) {
       estimate_text(1e6 * known.line_delay.prior.value, 1e6 * known.line_delay.prior.sigma, "us"));
 }
 
+// Empty: files can be made in this folder, or in the nearest one above it that exists.
+std::string folder_error(std::filesystem::path folder) {
+  std::error_code error;
+  const std::filesystem::path wanted = std::filesystem::absolute(folder, error);
+  folder = wanted;
+  while (!std::filesystem::exists(folder, error) && folder.has_relative_path())
+    folder = folder.parent_path();
+  const bool is_folder = std::filesystem::is_directory(folder, error);
+  if (is_folder && ::access(folder.c_str(), W_OK | X_OK) == 0) return "";
+  return fmt::format("{}: no file can be made there: {}{}; name a folder that can be written",
+                     wanted.string(), folder == wanted ? "" : folder.string() + ": ",
+                     std::generic_category().message(is_folder ? errno : ENOTDIR));
+}
+
+// What `run` would write later, and lose if it cannot.
+void check_folders(const Config& config, const std::string& file, Findings* findings) {
+  const auto judge = [&](const char* key, const std::filesystem::path& folder) {
+    const std::string error = folder_error(folder);
+    if (!error.empty()) add_problem(findings, fmt::format("{}: {}: {}", file, key, error));
+  };
+  if (!config.output.recordings.empty()) judge("output.recordings", config.output.recordings);
+  if (config.realtime.landmarks && config.calibration.automatic && !config.calibration.file.empty())
+    judge("calibration.file", std::filesystem::path(config.calibration.file).parent_path());
+  if (config.scene_map.update)
+    judge("scene_map.file", std::filesystem::path(config.scene_map.file).parent_path());
+}
+
 // Empty: the broker accepts a connection.
 std::string broker_error(const MqttOptions& options) {
   const std::string error = MqttConnection::files_error(options);
@@ -293,9 +333,8 @@ int check_links(const CheckOptions& options) {
   CheckReport report{
       options.config, calibration, measured, video, telemetry, {}, {}, {}, {}, {}, {}, {}};
   report.has_telemetry = has_telemetry(config);
-  report.repeats =
-      check_repeats(measured.frames, video.time_s, telemetry.fresh,
-                    {measured.video.name, calibration.calibration.camera.focal_length});
+  report.repeats = check_repeats(measured.frames, video.time_s, telemetry.fresh,
+                                 {measured.video.name, least_focal_length(calibration, config)});
   add_connection(measured.video, "video", &report.findings);
   if (report.has_telemetry) add_connection(measured.pan_tilt, "pan/tilt", &report.findings);
   const auto add = [&report](const Findings& more) {
@@ -318,6 +357,7 @@ int check_links(const CheckOptions& options) {
   }
   report.scene = check_scene(config, calibration, measured);
   add(report.scene.findings);
+  if (!is_recording(config)) check_folders(config, options.config, &report.findings);
   if (config.mqtt) {
     report.broker = config.mqtt->name();
     report.broker_error = broker_error(*config.mqtt);

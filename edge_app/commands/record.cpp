@@ -14,7 +14,9 @@
 #include <optional>
 #include <system_error>
 #include <thread>
+#include <vector>
 
+#include "edge_app/check/video_check.h"
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/record.h"
 #include "edge_app/commands/side_files.h"
@@ -92,6 +94,9 @@ class Recorder {
   [[nodiscard]] bool is_lost() const { return lost_; }
   [[nodiscard]] const RecordingCopy& copy() const { return copy_; }
 
+  // Only after stop(): frames since the first stored one that never came. Empty: not known.
+  [[nodiscard]] std::optional<std::int64_t> missing() const { return missing_frames(stamps_); }
+
   // Only after stop(): writes the rows to the disk. Returns the first error, or an empty text.
   std::string finish() {
     std::string error;
@@ -109,6 +114,7 @@ class Recorder {
       std::string error;
       if (!copy_.add(frame, &error)) return fail(error);
       lost_ = false;
+      if (copy_.frames() > 0) stamps_.emplace_back().stamp = frame.stamp;
       if (!begin_s() && copy_.frames() > 0) {
         begin_s_ = monotonic_now_s();
         static_cast<void>(::eventfd_write(news_, 1));
@@ -149,6 +155,7 @@ class Recorder {
   PanTiltSource& pan_tilt_;
   RecordingCopy copy_;
   int news_;
+  std::vector<CheckedFrame> stamps_;  // of what came since the first stored frame
   std::atomic<bool> lost_{false};
   std::atomic<double> begin_s_{0};  // 0: not yet
   std::mutex error_mutex_;
@@ -196,6 +203,15 @@ void say_what_is_missing(const std::string& directory, const Recorder& recorder,
   }
 }
 
+// More than one frame in a hundred: less can happen on any network.
+void say_what_never_came(const std::string& source, const Recorder& recorder) {
+  constexpr double kFew = 0.01;
+  const std::int64_t missing = recorder.missing().value_or(0);
+  const std::int64_t all = recorder.copy().frames() + recorder.copy().left_out() + missing;
+  if (static_cast<double>(missing) <= kFew * static_cast<double>(all)) return;
+  spdlog::warn("{}: {} of {} frames never came; see `alidade check`", source, missing, all);
+}
+
 }  // namespace
 
 int record_streams(const RecordOptions& options) {
@@ -227,6 +243,7 @@ int record_streams(const RecordOptions& options) {
                counted(recorder.copy().frames(), "frame"),
                counted(recorder.copy().samples(), "telemetry sample"));
   if (all) say_what_is_missing(options.directory, recorder, options.duration_s);
+  say_what_never_came(video->name(), recorder);
   if (recorder.copy().frames() > 0 && recorder.copy().samples() == 0) {
     spdlog::warn("{}: no telemetry came; see `alidade check`", pan_tilt->name());
   }

@@ -291,7 +291,12 @@ void Pipeline::calibrate() {
     }
     CalibrationReport report = calibration_->report();
     const bool due = calibration_->due();
-    if (due) stage_.report({CalibrationActivity::kAdjusting, report.need});
+    if (due) {
+      // Whether more of the same is needed is what is being computed.
+      const bool open = report.need == CalibrationNeed::kTime;
+      stage_.report(
+          {CalibrationActivity::kAdjusting, open ? CalibrationNeed::kNothing : report.need});
+    }
     if (auto published = calibration_->work()) {
       {
         const std::lock_guard<PriorityMutex> lock(summary_mutex_);

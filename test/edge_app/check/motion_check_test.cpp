@@ -142,6 +142,19 @@ TEST(MotionCheck, SaysHowFarTheFocalLengthIsOff) {
   EXPECT_THAT(problems(scene.check().findings), ElementsAre(HasSubstr("Calibrate again")));
 }
 
+// A zoom without a calibration may be at any place of its range, and each place is right.
+TEST(MotionCheck, TakesAnyFocalLengthOfAZoomsRange) {
+  Scene scene(wander);
+  scene.needs.focal_length_px = 0.5 * kFocalLength;
+  scene.needs.tele_px = 20 * kFocalLength;
+  EXPECT_THAT(scene.check().findings, IsEmpty());
+  scene.needs.tele_px = 0.6 * kFocalLength;
+  EXPECT_THAT(problems(scene.check().findings), ElementsAre(HasSubstr("but 1000 to 1200 px are")));
+  scene.needs.focal_length_px = 2 * kFocalLength;
+  scene.needs.tele_px = 20 * kFocalLength;
+  EXPECT_THAT(problems(scene.check().findings), ElementsAre(HasSubstr("but 4000 to 40000 px are")));
+}
+
 // As with a wrong range of a head that tells -1 to 1.
 TEST(MotionCheck, NamesAnAxisWhoseAnglesHaveAnotherScale) {
   for (const double factor : {1.06, 0.9, 2.0}) {

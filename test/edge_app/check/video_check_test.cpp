@@ -65,6 +65,17 @@ TEST(VideoCheck, MeasuresAHealthyStream) {
   EXPECT_NEAR(report.time_s[200] - report.time_s[100], 100 * kPeriod, 1e-4);
 }
 
+TEST(VideoCheck, CountsWhatIsMissingOfARecording) {
+  std::vector<CheckedFrame> frames = stream();
+  EXPECT_EQ(missing_frames(frames), 0);
+  frames.erase(frames.begin() + 100, frames.begin() + 120);
+  frames.erase(frames.begin() + 7);
+  EXPECT_EQ(missing_frames(frames), 21);
+  for (CheckedFrame& frame : frames) frame.stamp.sender_time_s.reset();
+  EXPECT_FALSE(missing_frames(frames)) << "arrivals do not tell";
+  EXPECT_FALSE(missing_frames({}));
+}
+
 TEST(VideoCheck, TellsInterlacedCoding) {
   std::vector<CheckedFrame> frames = stream();
   frames[3].interlaced = true;

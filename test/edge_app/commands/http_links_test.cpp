@@ -171,6 +171,19 @@ TEST_F(HttpLinks, AreSaidToBeRecordedForLessWhereThePicturesStop) {
   EXPECT_EQ(read_csv(directory_.read("recording/frames.csv")).size(), 5U);
 }
 
+TEST_F(HttpLinks, AreCheckedForTheFoldersThatRunWillWriteTo) {
+  directory_.write("taken", "no folder");
+  static_cast<void>(config());  // writes alidade.yaml
+  const std::string file =
+      directory_.write("other.yaml", directory_.read("alidade.yaml") +
+                                         "output: {json: false, http: '127.0.0.1:0', "
+                                         "recordings: taken/recordings}\n");
+  const Result result = alidade({"check", "-c", file, "--duration", "1"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.errors, HasSubstr("other.yaml: output.recordings: " + directory_.path() +
+                                       "/taken/recordings: no file can be made there: "));
+}
+
 TEST_F(HttpLinks, SayInOneLineWhatIsMissing) {
   const Result result = alidade({"check", "-c", config(""), "--duration", "1"});
   EXPECT_EQ(result.exit_code, 1);
