@@ -365,7 +365,8 @@ void add_map_build(CLI::App& map, int* exit_code) {
   command->add_option("--keyframes", options->keyframes, "Pictures to keep at most")
       ->check(CLI::Range(2, 2000))
       ->capture_default_str();
-  command->add_flag("--no-telemetry", options->no_telemetry, "By the pictures alone");
+  command->add_flag("--no-telemetry", options->no_telemetry,
+                    "By the pictures alone, and the zoom readings");
   command->add_flag("--largest-part", options->largest_part,
                     "If the pictures make several unconnected parts, take the largest");
   command->add_flag("--json", options->json, "The result on stdout as one line of JSON");
@@ -404,7 +405,8 @@ void add_localize(CLI::App& app, int* exit_code) {
       ->required();
   command->add_option("--calibration", options->calibration,
                       "Of a recording: gives the focal length for each zoom reading");
-  command->add_flag("--no-telemetry", options->no_telemetry, "By the pictures alone");
+  command->add_flag("--no-telemetry", options->no_telemetry,
+                    "By the pictures alone, and the zoom readings");
   command->add_option("--every", options->every, "Of a recording's frames, use every so many")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();

@@ -109,7 +109,8 @@ std::vector<Chosen> choose(const std::vector<MapRecording>& recordings,
     for (std::size_t i = 0; i < views[r].size(); ++i) {
       const MapView& view = views[r][i];
       if (!view.telemetry || !view.log_f) {
-        if (recordings[r].telemetry.empty() || !view.log_f) others.push_back({r, i});
+        const bool has_angles = recordings[r].has_angles && !recordings[r].telemetry.empty();
+        if (!has_angles || !view.log_f) others.push_back({r, i});
         continue;
       }
       const double haste =
@@ -337,14 +338,12 @@ int build_map(const MapBuildCommand& options) {
                                    calibration->name, known->camera.width, known->camera.height,
                                    build.width, build.height));
   }
-  // Without a reading a zoom curve knows no focal length; the pictures tell it.
-  const bool by_pictures = options.no_telemetry && options.focal_length.empty() &&
-                           known != nullptr && !calibration->zoom_curve.empty();
-  const FocalLengthKnowledge focal_lengths =
-      by_pictures
-          ? FocalLengthKnowledge()
-          : focal_length_knowledge(options.focal_length, known,
-                                   calibration ? calibration->zoom_curve : ZoomCurve(), readings);
+  // Without telemetry readings count only where somebody knows what they mean.
+  const bool knows_readings = (calibration && !calibration->zoom_curve.empty()) ||
+                              options.focal_length.find(':') != std::string::npos;
+  if (options.no_telemetry && !knows_readings) readings.clear();
+  const FocalLengthKnowledge focal_lengths = focal_length_knowledge(
+      options.focal_length, known, calibration ? calibration->zoom_curve : ZoomCurve(), readings);
   build.mechanics = known != nullptr ? known->mechanics : Mechanics<double>();
   if (known != nullptr) build.line_delay = known->line_delay;
   build.largest_part = options.largest_part;
@@ -370,7 +369,7 @@ int build_map(const MapBuildCommand& options) {
   }
   const SceneMap there = map_to_add(options.add, build);
   const double angle_sigma = views.front().front().angle_sigma;
-  if (known != nullptr && options.focal_length.empty() && !by_pictures) {
+  if (known != nullptr && options.focal_length.empty()) {
     std::vector<MapView> all;
     for (const std::vector<MapView>& some : views) all.insert(all.end(), some.begin(), some.end());
     for (const SceneKeyframe& k : there.keyframes) all.push_back(view_of(k, angle_sigma));

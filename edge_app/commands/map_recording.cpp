@@ -256,7 +256,7 @@ std::vector<double> MapRecording::zoom_readings() const {
   return out;
 }
 
-MapRecording load_map_recording(const std::string& directory, bool with_telemetry) {
+MapRecording load_map_recording(const std::string& directory, bool with_angles) {
   const auto require = [](bool ok, const std::string& error) {
     if (!ok) throw CommandError(kExitUsage, error);
   };
@@ -268,7 +268,8 @@ MapRecording load_map_recording(const std::string& directory, bool with_telemetr
           directory + ": no pictures in it; a scene map needs video.mkv or frames/");
   require(read_frames_csv(directory, &out.frames, &error), error);
   require(!out.frames.empty(), directory + "/frames.csv: no frames; record some");
-  if (with_telemetry && fs::exists(fs::path(directory) / "telemetry.csv")) {
+  out.has_angles = with_angles;
+  if (fs::exists(fs::path(directory) / "telemetry.csv")) {
     require(read_telemetry_csv(directory, &out.telemetry, &error), error);
     std::stable_sort(out.telemetry.begin(), out.telemetry.end(),
                      [](const PanTiltSample& a, const PanTiltSample& b) {
@@ -293,14 +294,25 @@ MapView map_view(const MapRecording& recording, const FrameStamp& frame,
   if (f) view.log_f = f->log_f;
   // A data sheet's error is common to all pictures, and not meant here.
   if (f && calibration != nullptr) view.log_f_sigma = f->sigma;
+  if (f) {
+    // Until telemetry tells more: how fast a camera turns that is to see something. A head turns it
+    // about its optical axis by the sine of its tilt alone.
+    constexpr double kFields = 0.5;  // fields of view a second
+    constexpr double kAboutAxis = 0.2;
+    view.motion_sigma.head<3>().setConstant(kFields * recording.info.width / std::exp(f->log_f));
+    view.motion_sigma[2] *= kAboutAxis;
+  }
   if (!told) return view;
   view.zoom = told->zoom;
-  view.telemetry = told->measured;
-  view.angle_sigma = calibration != nullptr ? kCalibratedAngleSigma : kNominalAngleSigma;
-  const Mechanics<double> mechanics = calibration != nullptr ? c.mechanics : Mechanics<double>();
-  view.angular_velocity = angular_velocity(mechanics, true_from_measured(mechanics, told->measured),
-                                           true_from_measured(mechanics, told->rate));
-  view.motion_sigma.head<3>().setConstant(told->rate_sigma);
+  if (recording.has_angles) {
+    view.telemetry = told->measured;
+    view.angle_sigma = calibration != nullptr ? kCalibratedAngleSigma : kNominalAngleSigma;
+    const Mechanics<double> mechanics = calibration != nullptr ? c.mechanics : Mechanics<double>();
+    view.angular_velocity =
+        angular_velocity(mechanics, true_from_measured(mechanics, told->measured),
+                         true_from_measured(mechanics, told->rate));
+    view.motion_sigma.head<3>().setConstant(told->rate_sigma);
+  }
   if (told->zoom && told->zoom_rate != 0) {
     constexpr double kStep_s = 1e-3;
     const auto later = known.at(*told->zoom + kStep_s * told->zoom_rate);

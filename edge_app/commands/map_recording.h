@@ -54,7 +54,8 @@ struct MapRecording {
   std::string directory;
   RecordingInfo info;
   std::vector<FrameStamp> frames;
-  std::vector<PanTiltSample> telemetry;  // by latest_time_s; empty: none, or not wanted
+  std::vector<PanTiltSample> telemetry;  // by latest_time_s; may be empty
+  bool has_angles = true;                // false: of the telemetry only the zoom readings count
   double angle_noise = 0;                // rad, of one angle, by the telemetry itself
 
   // Device units, in order of time. Samples without a reading are left out.
@@ -63,11 +64,11 @@ struct MapRecording {
 
 // Reads the tables, sorts telemetry and removes the jitter of its zoom readings (steady_zoom()).
 // Throws CommandError if a table is malformed, or if there are no pictures or no frames.
-[[nodiscard]] MapRecording load_map_recording(const std::string& directory, bool with_telemetry);
+[[nodiscard]] MapRecording load_map_recording(const std::string& directory, bool with_angles);
 
 // What is known of one frame. If `calibration` is null, the mechanics are nominal and the clock
 // offset is 0. If the frame lies outside the telemetry's time span, the view has no telemetry, no
-// zoom and no rates.
+// zoom and no rates. Rates without telemetry have sigmas of half a field of view a second.
 [[nodiscard]] MapView map_view(const MapRecording& recording, const FrameStamp& frame,
                                const Calibration* calibration, const FocalLengthKnowledge& known);
 
