@@ -328,8 +328,13 @@ bool extend_zoom(const ZoomCurve& curve, const Calibration& added, std::optional
     return false;
   }
   if (!belong_together(*fit, options, sample.reading, error)) return false;
-  ZoomSolution fitting(std::move(evidence), places, before.shared, options);
-  return fitting.run(error) && fitting.curve(&fit->curve, error);
+  ZoomSolution fitting(evidence, places, before.shared, options);
+  if (fitting.run(error) && fitting.curve(&fit->curve, error)) return true;
+  // Where smoothness alone holds nodes together, the evidence is a small difference of large
+  // numbers, and rounding may leave less than none of it. That is no word against the calibration.
+  std::string as_before;
+  ZoomSolution again(std::move(evidence), places, before.shared, options);
+  return again.run_as(before, &as_before) && again.curve(&fit->curve, &as_before);
 }
 
 }  // namespace alidade

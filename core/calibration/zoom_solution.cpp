@@ -133,16 +133,38 @@ bool ZoomSolution::run(std::string* error) {
     *error = kUndetermined;
     return false;
   }
-  content_.nodes = nodes_;
-  std::copy(evidence_.reading.begin(), evidence_.reading.end(), content_.reading.begin());
-  std::copy(evidence_.is_between.begin(), evidence_.is_between.end(), content_.is_between.begin());
-  content_.level = evidence_.level;
+  set_nodes();
   content_.repeatability = options_.repeatability;
   content_.smoothness = usual(rise_of(evidence_), reference_.camera);
   choose_roughness();
   if (solve()) return true;
   *error = kUndetermined;
   return false;
+}
+
+bool ZoomSolution::run_as(const ZoomCurve::Content& before, std::string* error) {
+  set_nodes();
+  content_.repeatability = before.repeatability;
+  content_.smoothness = before.smoothness;
+  // Roughness is per range of readings, which a node beyond the ends makes longer.
+  const auto range = [](const ZoomCurve::Content& content) {
+    return content.reading[static_cast<std::size_t>(content.nodes - 1)] - content.reading[0];
+  };
+  const double longer = range(content_) / range(before);
+  for (ZoomSmoothness& smoothness : content_.smoothness) {
+    smoothness.slope_sigma *= longer;
+    smoothness.roughness *= longer * std::sqrt(longer);
+  }
+  if (solve()) return true;
+  *error = kUndetermined;
+  return false;
+}
+
+void ZoomSolution::set_nodes() {
+  content_.nodes = nodes_;
+  std::copy(evidence_.reading.begin(), evidence_.reading.end(), content_.reading.begin());
+  std::copy(evidence_.is_between.begin(), evidence_.is_between.end(), content_.is_between.begin());
+  content_.level = evidence_.level;
 }
 
 ZoomSampleVector ZoomSolution::left_of(const ZoomSample& sample, int node) const {

@@ -21,6 +21,9 @@ class ZoomSolution {
 
   // False and one line in *error: something is undetermined.
   [[nodiscard]] bool run(std::string* error);
+  // The same with the smoothness of a curve that was taken apart for the evidence. With it, what
+  // rounding did to the evidence cancels.
+  [[nodiscard]] bool run_as(const ZoomCurve::Content& before, std::string* error);
 
   // After run(): the residual of a sample at a node against the solution.
   [[nodiscard]] ZoomSampleVector left_of(const ZoomSample& sample, int node) const;
@@ -30,6 +33,7 @@ class ZoomSolution {
   [[nodiscard]] bool curve(ZoomCurve* curve, std::string* error) const;
 
  private:
+  void set_nodes();
   void choose_roughness();
   [[nodiscard]] bool solve();
   void take_shared(const Eigen::Matrix<double, kSharedCount, 1>& change);

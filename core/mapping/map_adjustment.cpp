@@ -3,7 +3,7 @@
 #include <ceres/ceres.h>
 
 #include <Eigen/Cholesky>
-#include <Eigen/SparseCholesky>
+#include <Eigen/SparseCore>
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -293,6 +293,28 @@ double noise_found(const std::vector<double>& squares, const std::vector<bool>& 
   return std::max(1.0, std::sqrt(*middle / (median_of_two * free)));
 }
 
+using SparseColumns = Eigen::SparseMatrix<double>;
+
+// Of a matrix with blocks of 2x2 along its diagonal: each landmark has its own. False: singular.
+bool invert_blocks(const SparseColumns& matrix, SparseColumns* inverse) {
+  std::vector<Eigen::Triplet<double>> entries;
+  for (Eigen::Index i = 0; i < matrix.cols(); i += 2) {
+    Matrix2<double> block;
+    for (int a = 0; a < 2; ++a) {
+      for (int b = 0; b < 2; ++b) block(a, b) = matrix.coeff(i + a, i + b);
+    }
+    const Eigen::LDLT<Matrix2<double>> factors(block);
+    if (factors.info() != Eigen::Success || !(factors.vectorD().array() > 0).all()) return false;
+    const Matrix2<double> inverted = factors.solve(Matrix2<double>::Identity());
+    for (int a = 0; a < 2; ++a) {
+      for (int b = 0; b < 2; ++b) entries.emplace_back(i + a, i + b, inverted(a, b));
+    }
+  }
+  inverse->resize(matrix.rows(), matrix.cols());
+  inverse->setFromTriplets(entries.begin(), entries.end());
+  return true;
+}
+
 // Covariance of the shared unknowns by the reduced normal matrix, and the residuals' scale. False
 // if it is singular.
 bool shared_covariance(MapProblem* map, Eigen::MatrixXd* covariance, double* noise_scale) {
@@ -302,7 +324,6 @@ bool shared_covariance(MapProblem* map, Eigen::MatrixXd* covariance, double* noi
                                    map->shared.end());
   ceres::CRSMatrix all;
   if (!map->problem.Evaluate(evaluate, nullptr, nullptr, nullptr, &all)) return false;
-  using SparseColumns = Eigen::SparseMatrix<double>;
   const SparseColumns J = Eigen::Map<const Eigen::SparseMatrix<double, Eigen::RowMajor>>(
       all.num_rows, all.num_cols, static_cast<Eigen::Index>(all.values.size()), all.rows.data(),
       all.cols.data(), all.values.data());
@@ -310,11 +331,10 @@ bool shared_covariance(MapProblem* map, Eigen::MatrixXd* covariance, double* noi
   const Eigen::Index kept = J.cols() - eliminated;
   const SparseColumns A = J.leftCols(eliminated);
   const SparseColumns B = J.rightCols(kept);
-  const SparseColumns AA = A.transpose() * A;  // 2x2 blocks
-  const Eigen::SimplicialLDLT<SparseColumns, Eigen::Lower, Eigen::NaturalOrdering<int>> blocks(AA);
-  if (blocks.info() != Eigen::Success) return false;
+  SparseColumns inverse;
+  if (!invert_blocks(A.transpose() * A, &inverse)) return false;
   const SparseColumns AB = A.transpose() * B;
-  const SparseColumns eliminated_by = blocks.solve(AB);
+  const SparseColumns eliminated_by = inverse * AB;
   const SparseColumns BB = B.transpose() * B;
   Eigen::MatrixXd S = BB;
   S -= SparseColumns(AB.transpose() * eliminated_by);

@@ -508,6 +508,62 @@ TEST(ZoomExtension, KeepsWhatNodesSaidThatMakeRoom) {
   EXPECT_LT(curve.node(0).covariance(l, l), 1.3 * one / 40);
 }
 
+// As a camera that zooms to and fro for an hour: each rest is one more calibration on a curve that movements have told, too.
+// Where smoothness alone holds its nodes together, rounding must not make a contradiction of any.
+TEST(ZoomExtension, ACurveOfMovementsTakesCalibrationsForEver) {
+  const std::vector<Calibration> dwells = calibrations(five_visits());
+  constexpr double kPixelSigma = 2e-5;  // of log f, relative to the rests
+  std::mt19937_64 random(4);
+  std::normal_distribution<double> normal;
+  std::vector<MovementObservation> movements;
+  for (std::size_t i = 0; i + 1 < dwells.size(); ++i) {
+    MovementObservation one;
+    one.from = i;
+    one.to = i + 1;
+    const double begin = *dwells[i].zoom;
+    const double end = *dwells[i + 1].zoom;
+    const auto eps = [&](const Visit& visit) {
+      return visit.log_f - true_log_f(share_of(visit.reading));
+    };
+    std::vector<double> shares = {0, 1};
+    for (const double share : {0.0, 0.2, 0.4, 0.6, 0.8}) {
+      shares.push_back(share);
+      one.reading.push_back(begin + share * (end - begin));
+    }
+    const auto rows = static_cast<Eigen::Index>(shares.size());
+    one.log_focal_length.resize(rows);
+    for (Eigen::Index r = 0; r < rows; ++r) {
+      const double share = shares[static_cast<std::size_t>(r)];
+      one.log_focal_length[r] = true_log_f(share_of(begin + share * (end - begin))) +
+                                (1 - share) * eps(five_visits()[i]) +
+                                share * eps(five_visits()[i + 1]) + kPixelSigma * normal(random);
+    }
+    one.covariance = Eigen::MatrixXd::Identity(rows, rows) * kPixelSigma * kPixelSigma;
+    one.rate_per_s = Eigen::VectorXd::Zero(rows);
+    movements.push_back(one);
+  }
+  ZoomFit fit;
+  std::string error;
+  ASSERT_TRUE(fit_zoom(dwells, movements, fit_options(), &fit, &error)) << error;
+  for (std::size_t i = 0; i < 30; ++i) {
+    Calibration added = dwells[i % dwells.size()];
+    added.camera.focal_length *= std::exp(kRepeatability * normal(random));
+    ZoomFit next;
+    ASSERT_TRUE(extend_zoom(fit.curve, added, {}, fit_options(), &next, &error))
+        << i << ": " << error;
+    fit = next;
+    const Calibration node = fit.curve.node(fit.node);
+    EXPECT_NEAR(node.camera.focal_length / added.camera.focal_length, 1, 0.2 * kRepeatability) << i;
+  }
+  for (double reading = 500; reading < kLast; reading += 1000) {
+    Calibration between;
+    ASSERT_TRUE(fit.curve.at(reading, &between));
+    EXPECT_NEAR(std::log(between.camera.focal_length), true_log_f(share_of(reading)),
+                5 * relative_focal_length_sigma(between))
+        << reading;
+  }
+}
+
 TEST(ZoomExtension, AClockOfAnotherConnectionContradictsNothing) {
   Calibration later = five_visits()[2].calibration;
   later.clock_offset += 0.004;
