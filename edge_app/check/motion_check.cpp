@@ -207,8 +207,8 @@ MotionReport check_measured_motion(const std::vector<TimedShift>& shifts,
     return report;
   }
 
-  if (!needs.no_times.empty()) {
-    report.not_judged = needs.no_times;
+  if (!needs.not_judged.empty()) {
+    report.not_judged = needs.not_judged;
     report.pan = report.tilt = AxisVerdict::kNotJudged;
     return report;
   }

@@ -33,7 +33,7 @@ struct MotionNeeds {
   std::string turn_image;  // by 180 degrees
   // How the scale of an axis's angles is set: "pan_tilt.pan_range_deg and tilt_range_deg".
   std::string scales;
-  std::string no_times;  // why the image's times cannot be used; empty: they can
+  std::string not_judged;  // why image and head cannot be compared; empty: they can
 };
 
 enum class AxisVerdict {
@@ -61,7 +61,7 @@ struct MotionReport {
   std::optional<std::array<AxisFocalLength, 2>> by_axis;
   std::optional<double> clock_offset_s;  // known to about 20 ms
   double explained = 0;                  // share of the image's motion
-  std::string not_judged;                // why the image's times cannot be used
+  std::string not_judged;                // as in MotionNeeds
   Findings findings;
 };
 

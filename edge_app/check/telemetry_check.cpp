@@ -123,6 +123,11 @@ void judge_zoom(TelemetryReport* report, const TelemetryNeeds& needs) {
                fmt::format("{}the zoom changed from {} to {}; each zoom has its own calibration, "
                            "and there is none while it changes: keep it constant",
                            where, *report->other_zoom, *report->zoom));
+  } else if (report->other_zoom) {
+    add_advice(&report->findings,
+               fmt::format("{}the zoom changed from {} to {}, so signs, focal length and clock "
+                           "offset were not judged: keep it at rest during the check",
+                           where, *report->other_zoom, *report->zoom));
   }
   if (!report->zoom || !needs.zoom ||
       std::abs(*report->zoom - *needs.zoom) <= report->zoom_jitter.tolerance) {

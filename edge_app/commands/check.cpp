@@ -103,7 +103,8 @@ MotionReport motion_of(const Measured& measured, const VideoReport& video,
       "camera.upside_down: true; if not, for pan " +
       needs.reverse_pan + ", for tilt " + needs.reverse_tilt;
   needs.scales = scale_advice(config.pan_tilt);
-  needs.no_times = why_no_times(video.clock);
+  needs.not_judged = why_no_times(video.clock);
+  if (needs.not_judged.empty() && telemetry.other_zoom) needs.not_judged = "the zoom moved";
   return check_measured_motion(shifts, telemetry.fresh, needs);
 }
 
@@ -273,7 +274,9 @@ void check_lens_prior(const Config& config, const Camera<double>& camera) {
 // Empty: files can be made in this folder, or in the nearest one above it that exists.
 std::string folder_error(std::filesystem::path folder) {
   std::error_code error;
-  const std::filesystem::path wanted = std::filesystem::absolute(folder, error);
+  // The folder of a bare file name is empty.
+  const std::filesystem::path wanted =
+      std::filesystem::absolute(folder.empty() ? "." : folder, error).lexically_normal();
   folder = wanted;
   while (!std::filesystem::exists(folder, error) && folder.has_relative_path())
     folder = folder.parent_path();

@@ -191,6 +191,22 @@ std::vector<std::string> advice_for(const VerifyInput& input, const Verification
   if (extent.reversals < kReversalsLeast)
     out.push_back(fmt::format(
         "turn back {} times or more, so that places are passed from both sides", kReversalsLeast));
+  const auto is_judged = [](const ClaimComparison& claim) {
+    return claim.verdict != Verdict::kNotJudged;
+  };
+  if (verification.pairs >= kReturnsLeast &&
+      std::none_of(verification.claims.begin(), verification.claims.end(), is_judged)) {
+    out.push_back(fmt::format("record longer, {:g} s or more{}, so that returns are judged, too",
+                              kVerificationAsked_s, verification.zooms ? " at one zoom" : ""));
+  }
+  const auto is_clock = [](const DepartureTest& test) {
+    return test.departure == Departure::kClockOffset;
+  };
+  if (std::any_of(verification.found.begin(), verification.found.end(), is_clock)) {
+    out.emplace_back(
+        "the clock offset is that of the link: was the calibration made over another one? `run` "
+        "finds it anew at each start");
+  }
   if (verification.pairs < kReturnsLeast && out.empty())
     out.push_back(fmt::format("record longer, {:g} s or more, over a scene with more texture",
                               kVerificationAsked_s));

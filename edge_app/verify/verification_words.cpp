@@ -307,6 +307,8 @@ std::string summary_of(const Verification& v) {
     case Verdict::kHolds:
       if (!differ.empty()) parts.push_back(differ);
       if (known != nullptr) parts.push_back(known->sentence);
+      if (parts.empty())
+        parts.push_back(fmt::format("{} pairs of pictures show no departure", v.pairs));
       return "sigmas hold: " + joined(parts);
     case Verdict::kContradicted:
       break;

@@ -226,7 +226,7 @@ TEST(MotionCheck, TellsNoSignsWithoutTimes) {
                                Scene(wander)};
   for (TimedShift& shift : scenes.back().shifts) shift.shift = {shift.shift[1], -shift.shift[0]};
   for (Scene& scene : scenes) {
-    scene.needs.no_times = "the camera's time stamps count pictures";
+    scene.needs.not_judged = "the camera's time stamps count pictures";
     scene.needs.focal_length_px = 2 * kFocalLength;
     scene.needs.calibrated = true;
     const MotionReport report = scene.check();
@@ -244,7 +244,7 @@ TEST(MotionCheck, TellsNoSignsWithoutTimes) {
 
 TEST(MotionCheck, NoticesAHeadThatReportsOneAngleWithoutTimes) {
   Scene scene(wander, {0, 0});
-  scene.needs.no_times = "the camera's time stamps are not times";
+  scene.needs.not_judged = "the camera's time stamps are not times";
   EXPECT_THAT(problems(scene.check().findings), ElementsAre(HasSubstr("the angles never change")));
 }
 

@@ -198,7 +198,9 @@ TEST(TelemetryCheck, LooksAtTheZoom) {
   EXPECT_THAT(advice(check(samples).findings), ElementsAre(HasSubstr("changed from 100 to 120")));
   needed = needs();
   needed.has_zoom_curve = true;
-  EXPECT_THAT(check(samples, needed).findings, IsEmpty()) << "the curve holds at both";
+  EXPECT_THAT(problems(check(samples, needed).findings), IsEmpty()) << "the curve holds at both";
+  EXPECT_THAT(advice(check(samples, needed).findings),
+              ElementsAre(HasSubstr("keep it at rest during the check")));
 }
 
 TEST(TelemetryCheck, TellsJitterOfTheZoomFromAMovement) {

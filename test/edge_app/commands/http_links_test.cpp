@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
+#include <filesystem>
 #include <string>
 
 #include "test/edge_app/commands/alidade_command.h"
@@ -18,6 +19,8 @@ namespace {
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
+
+namespace fs = std::filesystem;
 
 class HttpLinks : public ::testing::Test {
  protected:
@@ -182,6 +185,16 @@ TEST_F(HttpLinks, AreCheckedForTheFoldersThatRunWillWriteTo) {
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_THAT(result.errors, HasSubstr("other.yaml: output.recordings: " + directory_.path() +
                                        "/taken/recordings: no file can be made there: "));
+  // A bare name, from where it lies: the present folder.
+  std::string bare = directory_.read("alidade.yaml");
+  bare.replace(bare.find("realtime:"), std::string::npos,
+               "calibration: {file: calibration.yaml}\n");
+  directory_.write("bare.yaml", bare);
+  const fs::path before = fs::current_path();
+  fs::current_path(directory_.path());
+  EXPECT_THAT(alidade({"check", "-c", "bare.yaml", "--duration", "1"}).errors,
+              Not(HasSubstr("no file can be made")));
+  fs::current_path(before);
 }
 
 TEST_F(HttpLinks, SayInOneLineWhatIsMissing) {

@@ -64,6 +64,13 @@ TEST(Verification, SaysWhichZoomItsDeparturesAreOf) {
   EXPECT_THAT(page, HasSubstr("of the 5 pictures at f 1000 px"));
 }
 
+TEST(Verification, HoldsInWordsAlsoWithoutReturnsThatAreJudged) {
+  Verification verification;
+  verification.verdict = Verdict::kHolds;
+  verification.pairs = 33;
+  EXPECT_EQ(summary_of(verification), "sigmas hold: 33 pairs of pictures show no departure");
+}
+
 TEST(Verification, HasJsonAndAPageWithEscapedNames) {
   Verification verification;
   verification.sentence = "not judged: <nothing>";
