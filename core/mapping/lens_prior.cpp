@@ -16,7 +16,7 @@ struct LensSample {
   LensQuantities variance;
 };
 
-LensSample sample_of(const Calibration& calibration, double held_sigma) {
+LensSample sample_of(const Calibration& calibration, const LensPriorOptions& options) {
   const ZoomQuantityMatrix<double> J = zoom_quantities_by_camera(calibration.camera);
   ZoomQuantityMatrix<double> covariance;
   for (int i = 0; i < kZoomQuantityCount; ++i) {
@@ -31,7 +31,10 @@ LensSample sample_of(const Calibration& calibration, double held_sigma) {
   out.log_f = out.value[0];
   out.value[0] = 0;
   out.variance = (J * covariance * J.transpose()).diagonal();
-  out.variance[0] = held_sigma * held_sigma;
+  out.variance[0] = options.held_sigma * options.held_sigma;
+  for (const int i : {index(ZoomQuantity::kCentreU), index(ZoomQuantity::kCentreV)}) {
+    if (!(out.variance[i] > 0)) out.variance[i] = options.centre_sigma_px * options.centre_sigma_px;
+  }
   return out;
 }
 
@@ -42,21 +45,22 @@ LensQuantities sigma_of(const LensQuantities& variance) {
 }  // namespace
 
 LensPrior lens_prior(const ZoomCurve& curve, double first_reading, double last_reading,
-                     double spacing, double held_sigma) {
+                     const LensPriorOptions& options) {
   constexpr int kSamples = 400;
   std::vector<LensSample> samples;
   Calibration calibration;
   for (int i = 0; i <= kSamples; ++i) {
     const double part = static_cast<double>(i) / kSamples;
     if (curve.at(first_reading + part * (last_reading - first_reading), &calibration))
-      samples.push_back(sample_of(calibration, held_sigma));
+      samples.push_back(sample_of(calibration, options));
   }
   const auto [least, most] = std::minmax_element(
       samples.begin(), samples.end(),
       [](const LensSample& a, const LensSample& b) { return a.log_f < b.log_f; });
   constexpr double kBeyond = 0.02;  // of log f; the ends must be inside
   LensPrior out;
-  out.lens = LensCurve(calibration.camera, least->log_f - kBeyond, most->log_f + kBeyond, spacing);
+  out.lens =
+      LensCurve(calibration.camera, least->log_f - kBeyond, most->log_f + kBeyond, options.spacing);
   const int count = out.lens.control_points();
   const auto rows = static_cast<Eigen::Index>(samples.size());
   Eigen::MatrixXd weights = Eigen::MatrixXd::Zero(rows, count);
@@ -79,11 +83,11 @@ LensPrior lens_prior(const ZoomCurve& curve, double first_reading, double last_r
   return out;
 }
 
-LensPrior lens_prior(const Calibration& calibration, double held_sigma) {
+LensPrior lens_prior(const Calibration& calibration, const LensPriorOptions& options) {
   LensPrior out;
   out.lens = LensCurve::of(calibration.camera);
   out.sigmas.assign(static_cast<std::size_t>(out.lens.control_points()),
-                    sigma_of(sample_of(calibration, held_sigma).variance));
+                    sigma_of(sample_of(calibration, options).variance));
   return out;
 }
 

@@ -227,8 +227,8 @@ bool solve(const MapOptions& options, double least_gain, MapProblem* map, bool* 
   solver.linear_solver_type = ceres::SPARSE_SCHUR;
   auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
   for (double* block : map->landmarks) ordering->AddElementToGroup(block, 0);
-  // Within a group Ceres orders by address. So each kind has a group of its own, to be the same each
-  // time.
+  // Within a group Ceres orders by address. So each kind has a group of its own, to be the same
+  // each time.
   for (std::size_t i = 0; i < map->shared.size(); ++i) {
     const int group = i < map->pictures ? 1 : i < map->hold ? 2 : i == map->hold ? 3 : 4;
     ordering->AddElementToGroup(map->shared[i], group);

@@ -1,8 +1,8 @@
 #pragma once
 // The terms of map_adjustment.h as Ceres cost functions with Jacobians. Parameter blocks: of a
-// picture (xi, eps) with R = R_start Exp(xi), and the change of its motion (w, zoom rate); of a landmark the change of its start direction; of
-// the lens its control points, and hold. SeenCost fails if the landmark has no pixel, the others
-// never.
+// picture (xi, eps) with R = R_start Exp(xi), and the change of its motion (w, zoom rate); of a
+// landmark the change of its start direction; of the lens its control points, and hold. SeenCost
+// fails if the landmark has no pixel, the others never.
 
 #include <ceres/sized_cost_function.h>
 

@@ -155,7 +155,8 @@ std::vector<Chosen> choose(const std::vector<MapRecording>& recordings,
 // The whole lens over the zooms of the views. Nothing if a view is not of this calibration, as one
 // of an older map that another one made.
 std::optional<LensPrior> prior_of(const PublishedCalibration& known,
-                                  const std::vector<MapView>& views, double spacing, double held) {
+                                  const std::vector<MapView>& views,
+                                  const LensPriorOptions& options) {
   constexpr double kOneZoom = 0.01;  // of log f
   const auto by_log_f = [](const MapView& a, const MapView& b) { return *a.log_f < *b.log_f; };
   if (!std::all_of(views.begin(), views.end(), [](const MapView& view) { return view.log_f; }))
@@ -163,15 +164,15 @@ std::optional<LensPrior> prior_of(const PublishedCalibration& known,
   const auto [least, most] = std::minmax_element(views.begin(), views.end(), by_log_f);
   LensPrior prior;
   if (known.zoom_curve.empty()) {
-    prior = lens_prior(known.calibration, held);
+    prior = lens_prior(known.calibration, options);
   } else if (!least->zoom || !most->zoom) {
     return std::nullopt;
   } else if (*most->log_f - *least->log_f < kOneZoom) {
     Calibration there;
     if (!known.zoom_curve.at(*least->zoom, &there)) return std::nullopt;
-    prior = lens_prior(there, held);
+    prior = lens_prior(there, options);
   } else {
-    prior = lens_prior(known.zoom_curve, *least->zoom, *most->zoom, spacing, held);
+    prior = lens_prior(known.zoom_curve, *least->zoom, *most->zoom, options);
   }
   const bool covers = prior.lens.begin_s() <= *least->log_f && *most->log_f <= prior.lens.end_s();
   return covers ? std::optional(prior) : std::nullopt;
@@ -196,7 +197,8 @@ void hold_lens(const PublishedCalibration& known, const std::vector<MapView>& vi
   const double held = std::hypot(kFromDayToDay, sigma);
   for (double* prior : {&build->adjustment.level_sigma[0], &build->adjustment.bend_sigma[0]})
     *prior = std::min(*prior, held);
-  const std::optional<LensPrior> prior = prior_of(known, views, build->lens_spacing, held);
+  const std::optional<LensPrior> prior =
+      prior_of(known, views, {held, build->centre_share * build->width, build->lens_spacing});
   if (!prior) return;
   build->lens = prior->lens;
   build->adjustment.level_sigmas = prior->sigmas;

@@ -1,6 +1,7 @@
 #include "edge_app/commands/visible_calibration.h"
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 #include <unistd.h>
 
 #include <cstdint>
@@ -65,7 +66,7 @@ KnownCameraCalibration calibrate_visibly(const CalibrationJob& job, double begin
 
 // Puts as many of the found tracks into the job as an adjustment can take, and notes the frames
 // that are left without one.
-void use_tracks(VideoTracks tracks, CalibrationJob* job, std::vector<std::string>* remarks) {
+void use_tracks(VideoTracks tracks, CalibrationJob* job) {
   UntrackedFrames found = std::move(tracks.without);
   const std::size_t before = without_shared_pixels(tracks.observations).size();
   job->input.observations = choose_tracks(std::move(tracks.observations), kMaxObservations, &found);
@@ -78,10 +79,10 @@ void use_tracks(VideoTracks tracks, CalibrationJob* job, std::vector<std::string
     untracked[frame.frame] = why == found.end() ? Untracked::kNoPicture : why->second;
   }
   if (before <= kMaxObservations) return;
-  remarks->push_back(
-      fmt::format("video: only {} of {} observations are used, as more than {} take too long: "
-                  "those of the points that moved farthest, evenly over the recording",
-                  job->input.observations.size(), before, kMaxObservations));
+  spdlog::info(
+      "video: {} of {} observations are used, of the points that moved farthest; more take long "
+      "and tell little",
+      job->input.observations.size(), before);
 }
 
 // Finds tracks, with a first estimate unless `estimate` is null, and calibrates with them.
@@ -98,7 +99,7 @@ KnownCameraCalibration calibrate_video(const CalibrationResult* estimate, Calibr
                            ? track_video(job->recording, job->input, look)
                            : track_video(job->recording, job->input, *estimate, look);
   *remarks = std::move(tracks.remarks);
-  use_tracks(std::move(tracks), job, remarks);
+  use_tracks(std::move(tracks), job);
   return calibrate_visibly(*job, kShareOfLooking, progress);
 }
 

@@ -191,7 +191,7 @@ SceneLocator::Outcome SceneLocalization::judge(const LocalizableFrame& frame,
     case BaseJudge::Verdict::kExpected:
       report_.uncorrected = false;
       if (is_first && has_telemetry_) {
-        spdlog::info("scene map: frame {} is localized; telemetry's angles are too small by {}",
+        spdlog::info("scene map: frame {} is localized, where telemetry has it but for {}",
                      told->frame, describe(offset));
       }
       return Outcome::kTold;

@@ -207,8 +207,8 @@ class OrientationStep {
   [[nodiscard]] bool take_scene_lens(const ToldBase& told);
 
   [[nodiscard]] Calibration at_any_zoom() const;
-  // PT mode's record at another zoom, by the curve, else by at_any_zoom(). measured null: the status
-  // already says why there is no angle.
+  // PT mode's record at another zoom, by the curve, else by at_any_zoom(). measured null: the
+  // status already says why there is no angle.
   void orient_between(const InterpolatedPanTilt* measured, double telemetry_time_s,
                       OrientationRecord* record);
   // s, from a frame's first row to its last.

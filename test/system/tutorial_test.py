@@ -133,6 +133,57 @@ class Tutorial(SystemTest):
         self.assertTrue((self.folder / "plane.yaml").is_file())
         self.assertTrue((self.folder / "map/panorama.png").is_file())
 
+    def of_the_virtual_camera(self, configuration, ready):
+        """A configuration of the page for the camera that the line `ready` names, with pictures of 480x272."""
+        video, pan_tilt = ready.split()[1:3]
+        for pattern, text in ((r'url: "rtsp:[^"]*"', f'url: "{video}"'), (r'url: "http:[^"]*"', f'url: "{pan_tilt}"'),
+                              ("width: 1280, height: 720", "width: 480, height: 272"), ("wide: 1200, tele: 24000", "wide: 450, tele: 9000")):
+            configuration, count = re.subn(pattern, text, configuration)
+            self.assertEqual(count, 1, pattern)
+        return configuration
+
+    def follow_a_zoom(self, line):
+        """Over a whole round of five zooms: the mode stays OE, and the curve in use."""
+        run = self.in_folder(*line.split()[1:], "--json")
+        records = []
+        while len(records) < 25 * 75:
+            record = run.lines.get(timeout=DEADLINE_S)
+            self.assertIsNotNone(record, run.errors)
+            records.append(json.loads(record))
+            if records[-1]["mode"] == "none" and not any(one["mode"] == "OE" for one in records):
+                records.clear()  # not begun
+        run.child.send_signal(signal.SIGINT)
+        self.assertEqual(run.child.wait(timeout=DEADLINE_S), 0)
+        log = "\n".join(run.errors)
+        self.assertIn("is localized", log)
+        self.assertNotIn("set aside", log)
+        readings = {one["zoom"] for one in records}
+        self.assertTrue({1, 3906, 6551, 8522, 9999} <= readings, readings)
+        others = [one["status"] for one in records if one["mode"] != "OE"]
+        self.assertLess(len(others), 0.1 * len(records), sorted(set(others)))
+        self.assertNotIn("no calibration for this zoom", others)
+
+    def test_of_a_zooming_camera_leads_where_it_says(self):
+        """With the virtual camera wherever the page offers it."""
+        ran = []
+        for language, _, content in self.blocks_of("tutorial/zooming-camera.md"):
+            if language == "yaml":
+                configuration = content
+            for line in content.strip().splitlines() if language == "sh" else ():
+                if line.startswith("alidade-simulate ") and " -o " not in line:
+                    camera = Process("env", "-C", self.folder, SIMULATE, *line.split()[1:])
+                    self.processes.append(camera)
+                    ready = camera.lines.get(timeout=RENDERING_S)
+                    self.assertTrue(ready and ready.startswith("ready "), camera.errors)
+                    (self.folder / "camera.yaml").write_text(self.of_the_virtual_camera(configuration, ready), encoding="utf-8")
+                elif line.startswith("alidade run "):
+                    self.follow_a_zoom(line)
+                elif not line.startswith("alidade record "):  # the virtual camera has shown it all
+                    self.shell(line.replace(" zooms scene ", " zooms "))
+                ran.append(line.split()[:2])
+        self.assertEqual([words for words in ran if words[0].startswith("alidade")].count(["alidade", "map"]), 3)
+        self.assertIn(["alidade", "run"], ran)
+
 
 if __name__ == "__main__":
     unittest.main()

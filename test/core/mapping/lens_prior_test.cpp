@@ -10,6 +10,8 @@ namespace alidade::test {
 namespace {
 
 constexpr double kHeld = 2e-4;
+constexpr double kCentre_px = 7;
+constexpr LensPriorOptions kOptions{kHeld, kCentre_px, 0.4};
 
 // Sigma of a quantity at a place, of control points whose errors are independent.
 LensQuantities sigma_at(const LensPrior& prior, double log_f) {
@@ -24,7 +26,7 @@ LensQuantities sigma_at(const LensPrior& prior, double log_f) {
 
 TEST(LensPrior, FollowsTheZoomCurveAndKnowsWhereThatKnowsLess) {
   const ZoomCurve curve = zoom_curve();
-  const LensPrior prior = lens_prior(curve, 800, 2100, 0.4, kHeld);
+  const LensPrior prior = lens_prior(curve, 800, 2100, kOptions);
   ASSERT_EQ(prior.sigmas.size(), static_cast<std::size_t>(prior.lens.control_points()));
   for (const LensQuantities& sigma : prior.sigmas) {
     EXPECT_TRUE((sigma.array() > 0).all());
@@ -52,8 +54,8 @@ TEST(LensPrior, FollowsTheZoomCurveAndKnowsWhereThatKnowsLess) {
 
 TEST(LensPrior, OfReadingsThatFallIsTheSame) {
   const ZoomCurve curve = zoom_curve();
-  const LensPrior rising = lens_prior(curve, 1000, 2000, 0.4, kHeld);
-  const LensPrior falling = lens_prior(curve, 2000, 1000, 0.4, kHeld);
+  const LensPrior rising = lens_prior(curve, 1000, 2000, kOptions);
+  const LensPrior falling = lens_prior(curve, 2000, 1000, kOptions);
   for (int i = 0; i < rising.lens.control_points(); ++i) {
     EXPECT_LT((rising.lens.control_point(i) - falling.lens.control_point(i)).norm(), 1e-6);
   }
@@ -61,7 +63,7 @@ TEST(LensPrior, OfReadingsThatFallIsTheSame) {
 
 TEST(LensPrior, OfALensThatDoesNotZoomIsItsCalibration) {
   const Calibration calibration = zoom_calibration(1500);
-  const LensPrior prior = lens_prior(calibration, kHeld);
+  const LensPrior prior = lens_prior(calibration, kOptions);
   const double log_f = std::log(calibration.camera.focal_length);
   const Camera<double> camera = prior.lens.camera_at(log_f);
   EXPECT_NEAR(camera.focal_length, calibration.camera.focal_length, 1e-9);
@@ -72,8 +74,10 @@ TEST(LensPrior, OfALensThatDoesNotZoomIsItsCalibration) {
   }
   Calibration exact = calibration;
   exact.covariance.setZero();
-  for (const LensQuantities& sigma : lens_prior(exact, kHeld).sigmas)
+  for (const LensQuantities& sigma : lens_prior(exact, kOptions).sigmas) {
     EXPECT_TRUE((sigma.array() > 0).all()) << "a prior needs a sigma";
+    EXPECT_NEAR(sigma[index(ZoomQuantity::kCentreU)], kCentre_px, 1e-9) << "it was held, not known";
+  }
 }
 
 }  // namespace
