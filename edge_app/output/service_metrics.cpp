@@ -205,7 +205,7 @@ void add_target_metrics(const TargetFeed& feed, MetricsText* out) {
 void add_link_delay_metrics(const PipelineSummary& summary, double now_s, MetricsText* out) {
   out->gauge("alidade_link_delay_seconds",
              "By how much telemetry comes later against the pictures than when the camera was "
-             "calibrated");
+             "calibrated; 0 if it was through this connection");
   out->add(summary.link_delay->delay_s);
   out->gauge("alidade_link_delay_sigma_seconds", "Its standard deviation");
   out->add(summary.link_delay->sigma_s);

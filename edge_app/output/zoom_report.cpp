@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <optional>
 #include <utility>
 
 #include "core/calibration/number_text.h"
@@ -237,6 +238,24 @@ std::string departures_figure(const ZoomReportInput& report) {
       plot.svg("residuals of the focal length against the curve"));
 }
 
+// f of the visit that is this dwell, by all that was calibrated together.
+std::string together_cells(const ZoomCurve& curve, const ZoomReportDwell& dwell) {
+  std::optional<Calibration> visit;
+  const double own = dwell.own.camera.focal_length;
+  for (int i = 0; i < curve.content().nodes; ++i) {
+    const Calibration node = curve.node(i);
+    if (curve.content().is_between[static_cast<std::size_t>(i)] || *node.zoom != dwell.zoom)
+      continue;
+    if (!visit ||
+        std::abs(node.camera.focal_length - own) < std::abs(visit->camera.focal_length - own))
+      visit = node;
+  }
+  if (!visit) return "<td></td><td></td>";
+  const double sigma = parameter_sigma(*visit, Parameter::kFocalLength);
+  return fmt::format("<td>{}</td><td>{}</td>", value_text(visit->camera.focal_length, sigma),
+                     sigma_text(sigma));
+}
+
 std::string dwell_rows(const ZoomReportInput& report) {
   std::string out;
   for (const ZoomReportDwell& dwell : report.dwells) {
@@ -244,7 +263,7 @@ std::string dwell_rows(const ZoomReportInput& report) {
         dwell.page.empty() ? "" : fmt::format("<a href=\"{0}\">{0}</a>", escape_html(dwell.page));
     if (!dwell.refusal.empty()) {
       out += fmt::format(
-          "<tr><td>{:g}</td><td colspan=\"7\" class=\"words\">left out: {}</td><td>{}</td></tr>\n",
+          "<tr><td>{:g}</td><td colspan=\"9\" class=\"words\">left out: {}</td><td>{}</td></tr>\n",
           dwell.zoom, escape_html(dwell.refusal), page);
       continue;
     }
@@ -254,10 +273,10 @@ std::string dwell_rows(const ZoomReportInput& report) {
     const double u = parameter_sigma(c, Parameter::kCentreU);
     const double v = parameter_sigma(c, Parameter::kCentreV);
     out += fmt::format(
-        "<tr><td>{:g}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}, {}</td>"
+        "<tr><td>{:g}</td>{}<td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}, {}</td>"
         "<td>{}, {}</td><td>{}</td><td>{}</td></tr>\n",
-        dwell.zoom, value_text(c.camera.focal_length, f), sigma_text(f),
-        value_text(c.camera.distortion.only_term(), k), sigma_text(k),
+        dwell.zoom, together_cells(report.fit.curve, dwell), value_text(c.camera.focal_length, f),
+        sigma_text(f), value_text(c.camera.distortion.only_term(), k), sigma_text(k),
         value_text(c.camera.centre_u, u), value_text(c.camera.centre_v, v), sigma_text(u),
         sigma_text(v), rounded_text(departure_of(report.fit.curve, dwell).sigmas(), 1), page);
   }
@@ -384,8 +403,11 @@ std::string zoom_report(const ZoomReportInput& report) {
   for (const LensQuantity& quantity : lens_quantities()) body += curve_figure(report, quantity);
   body += departures_figure(report);
   body +=
-      "<h2>Dwells</h2>\n<div class=\"scroll\"><table>\n<thead><tr><th>reading</th>"
-      "<th>f, px</th><th>sigma</th><th>k</th><th>sigma</th><th>centre, px</th><th>sigma</th>"
+      "<h2>Dwells</h2>\n<p class=\"soft\">Together: with all other dwells and movements, as in the "
+      "table of <code>calibrate</code>. The other columns are of each dwell by itself.</p>\n"
+      "<div class=\"scroll\"><table>\n<thead><tr><th>reading</th>"
+      "<th>f together, px</th><th>sigma</th><th>f alone, "
+      "px</th><th>sigma</th><th>k</th><th>sigma</th><th>centre, px</th><th>sigma</th>"
       "<th>off the curve, sigmas</th><th>report</th></tr></thead>\n<tbody>\n" +
       dwell_rows(report) + "</tbody>\n</table></div>\n";
   if (!report.movements.empty()) {

@@ -313,8 +313,10 @@ void Pipeline::calibrate() {
       tell_progress();
       told_s = now_s;
     }
-    for (const std::string& line : calibration_->take_messages())
-      spdlog::info("calibration: {}", line);
+    for (const CalibrationMessage& message : calibration_->take_messages()) {
+      spdlog::log(message.is_warning ? spdlog::level::warn : spdlog::level::info, "calibration: {}",
+                  message.text);
+    }
     if (report.activity != said.activity || report.need != said.need) {
       spdlog::info(
           "calibration: {}{}{}", to_string(report.activity),

@@ -87,15 +87,17 @@ void SelfCalibration::clock_began_anew() {
 
 bool SelfCalibration::judge_delay(const FrameTracks& tracks) {
   if (streams_.judge_delay(tracks)) {
-    messages_.say(
-        streams_.delay_wanders()
-            ? fmt::format("the video's delay, or its time stamps, wander by {:.0f} ms, more than "
-                          "the {:.0f} ms up to which a clock offset can be found: a relay, Wi-Fi, "
-                          "or a camera or machine that is too busy; nothing is calibrated and "
-                          "nothing withdrawn until they hold",
-                          1e3 * tracks.delay_wander_s, 1e3 * options_.schedule.most_wander_s)
-            : "the video's delay holds again; the clock offset is found anew");
-    if (streams_.delay_wanders()) widen_contradicted();
+    if (streams_.delay_wanders()) {
+      messages_.warn(
+          fmt::format("the video's delay, or its time stamps, wander by {:.0f} ms, more than "
+                      "the {:.0f} ms up to which a clock offset can be found: a relay, Wi-Fi, "
+                      "or a camera or machine that is too busy; nothing is calibrated and "
+                      "nothing withdrawn until they hold",
+                      1e3 * tracks.delay_wander_s, 1e3 * options_.schedule.most_wander_s));
+      widen_contradicted();
+    } else {
+      messages_.say("the video's delay holds again; the clock offset is found anew");
+    }
     begin_anew();
     publication_.clock_began_anew();
     clock_began_anew();
@@ -113,7 +115,7 @@ void SelfCalibration::widen_contradicted() {
   auto widened = std::make_shared<PublishedCalibration>(*publication_.object());
   widened->calibration.covariance *= *chi_square / parameters;
   widened->name += ", widened";
-  messages_.say(fmt::format(
+  messages_.warn(fmt::format(
       "the last motion contradicted the calibration (chi-square {:.0f}), and while the delay "
       "wanders none can take its place: its sigmas are now {:.1f} times as wide",
       *chi_square, std::sqrt(*chi_square / parameters)));
@@ -126,7 +128,7 @@ void SelfCalibration::judge_agreement(const FrameTracks& tracks) {
   if (!disagreement_.judge(tracks.stamp.receive_time_s, contradicted)) return;
   if (!options_.automatic) {
     // Nothing would take its place.
-    messages_.say_once(
+    messages_.warn_once(
         fmt::format("landmarks contradict telemetry in half of the frames (was the camera "
                     "moved on its mount, or its lens?); the calibration {} stays in use, as "
                     "calibration.auto is false: calibrate again",
@@ -147,8 +149,8 @@ void SelfCalibration::withdraw(const std::string& reason, const std::string& que
   withdrawn->calibration.covariance += options_.data_sheet.covariance;
   withdrawn->telemetry_error = publication_.object()->telemetry_error;
   withdrawn->name = publication_.object()->name + ", withdrawn";
-  messages_.say(fmt::format("{}: the calibration {} is withdrawn ({}); calibrating anew", reason,
-                            publication_.object()->name, question));
+  messages_.warn(fmt::format("{}: the calibration {} is withdrawn ({}); calibrating anew", reason,
+                             publication_.object()->name, question));
   publication_.withdraw(withdrawn);
   nodes_.doubt();
   begin_anew();
@@ -222,7 +224,7 @@ void SelfCalibration::store(const CalibrationResult& result, const MapState& map
   stored.map = map;
   std::string error;
   if (archive_->save(stored, &error)) return;
-  messages_.say(archive_->has_pending() ? error + "; kept, will be tried again" : error);
+  messages_.warn(archive_->has_pending() ? error + "; kept, will be tried again" : error);
 }
 
 void SelfCalibration::publish(const CheckedCalibration& checked) {
@@ -285,8 +287,9 @@ void SelfCalibration::hold_against_published() {
       agrees ? ContradictionJudge::Verdict::kAgrees : contradiction_.judge(chi_square);
   if (verdict != ContradictionJudge::Verdict::kAgrees) {
     pace_.watch_soon();
-    messages_.say(fmt::format("the camera is not what the calibration says (chi-square {:.0f}): {}",
-                              chi_square, describe(alone.result.calibration)));
+    messages_.warn(
+        fmt::format("the camera is not what the calibration says (chi-square {:.0f}): {}",
+                    chi_square, describe(alone.result.calibration)));
     if (verdict != ContradictionJudge::Verdict::kBelieved) return;
     contradiction_.restart();
     if (makes_nodes()) {
@@ -372,7 +375,11 @@ std::shared_ptr<const PublishedCalibration> SelfCalibration::work() {
   if (storing_is_due()) {
     std::string error;
     last_store_s_ = streams_.now_s();
-    messages_.say_once(archive_->save_pending(&error) ? "the calibration is stored now" : error);
+    if (archive_->save_pending(&error)) {
+      messages_.say_once("the calibration is stored now");
+    } else {
+      messages_.warn_once(error);
+    }
   }
   if (first_node_is_due()) take_first_node();
   if (first_node_is_wanted()) {
@@ -391,14 +398,14 @@ std::shared_ptr<const PublishedCalibration> SelfCalibration::work() {
 CalibrationReport SelfCalibration::report() const {
   CalibrationReport report;
   if (!options_.automatic) return report;
-  report.activity = is_calibrated_here()          ? CalibrationActivity::kWatching
+  report.activity = is_known_here()               ? CalibrationActivity::kWatching
                     : publication_.is_withdrawn() ? CalibrationActivity::kDoubtful
                                                   : CalibrationActivity::kCollecting;
   const std::optional<CalibrationNeed> unsteady = streams_.unsteady();
   const std::optional<CalibrationNeed> missing = streams_.missing();
   if (unsteady) {
     report.need = *unsteady;
-  } else if (!wants_first()) {
+  } else if (is_known_here() && !publication_.is_fresh_wanted()) {
     report.need = CalibrationNeed::kNothing;
   } else if (missing) {
     report.need = *missing;
@@ -424,7 +431,8 @@ CalibrationNeed SelfCalibration::missing_motion() const {
 }
 
 std::optional<CalibrationProgress> SelfCalibration::progress() const {
-  if (!options_.automatic || !wants_first()) return std::nullopt;
+  if (!options_.automatic || (is_known_here() && !publication_.is_fresh_wanted()))
+    return std::nullopt;
   const Camera<double>& camera = publication_.calibration().camera;
   CalibrationProgress progress;
   progress.attempts = pace_.tries();

@@ -87,7 +87,7 @@ class SelfCalibration {
   // Thread-safe. Every work(), present or later, soon ends without a result.
   void cancel();
   // The lines for the log since the last call: what was found, why something was refused.
-  [[nodiscard]] std::vector<std::string> take_messages() { return messages_.take(); }
+  [[nodiscard]] std::vector<CalibrationMessage> take_messages() { return messages_.take(); }
 
  private:
   void begin_anew();
@@ -103,6 +103,9 @@ class SelfCalibration {
   // Takes the published calibration back and begins anew. reason, question: for the message.
   void withdraw(const std::string& reason, const std::string& question);
   [[nodiscard]] bool is_calibrated_here() const;
+  // The curve tells the lens of the present reading, as while the zoom moves.
+  [[nodiscard]] bool is_on_curve() const;
+  [[nodiscard]] bool is_known_here() const { return is_calibrated_here() || is_on_curve(); }
   [[nodiscard]] bool wants_first() const {
     return !is_calibrated_here() || publication_.is_fresh_wanted();
   }

@@ -52,7 +52,7 @@ void SelfCalibration::take_jitter() {
 void SelfCalibration::judge_zoom(const PanTiltSample& sample) {
   using Change = PresentZoom::Change;
   if (sample.zoom && !std::isfinite(*sample.zoom)) {
-    messages_.say_once(
+    messages_.warn_once(
         "the pan/tilt source tells a zoom reading that is no number; such are left out");
   }
   const Change change = zoom_.add(sample);
@@ -60,7 +60,7 @@ void SelfCalibration::judge_zoom(const PanTiltSample& sample) {
     case Change::kNone:
       return;
     case Change::kSilent:
-      messages_.say_once(fmt::format(
+      messages_.warn_once(fmt::format(
           "no zoom reading for {:g} s; the last, {}, is taken to hold: does the pan/tilt link tell "
           "the zoom in every answer?",
           options_.schedule.zoom_silence_s, *zoom_.reading()));
@@ -83,6 +83,13 @@ void SelfCalibration::judge_zoom(const PanTiltSample& sample) {
     case Change::kFirst:
       begin_anew();
   }
+}
+
+bool SelfCalibration::is_on_curve() const {
+  Calibration here;
+  return zoom_.reading() && nodes_.believed_curve().at(*zoom_.reading(), &here) &&
+         relative_focal_length_sigma(here) <= kSharpFocalLength &&
+         !publication_.is_rejected(*zoom_.reading(), zoom_.tolerance());
 }
 
 // At a new zoom: was the camera there before, or is it on the curve?
@@ -216,7 +223,7 @@ void SelfCalibration::take_node(const ZoomAddition& addition, CheckedCalibration
 
 // Perhaps this reading alone is wrong: the other nodes are kept until a second one contradicts.
 void SelfCalibration::contradict_nodes(const CheckedCalibration& alone, const std::string& why) {
-  messages_.say(fmt::format("zoom {}: not of the zoom curve: {}", *zoom_.reading(), why));
+  messages_.warn(fmt::format("zoom {}: not of the zoom curve: {}", *zoom_.reading(), why));
   const auto verdict = contradiction_.judge(std::numeric_limits<double>::infinity());
   if (publication_.is_fresh_wanted() || verdict == ContradictionJudge::Verdict::kBelieved) {
     contradiction_.restart();
@@ -228,7 +235,7 @@ void SelfCalibration::contradict_nodes(const CheckedCalibration& alone, const st
 
 void SelfCalibration::begin_nodes_anew(const CheckedCalibration& alone) {
   const std::string aside = archive_ == nullptr ? "" : archive_->set_zooms_aside();
-  messages_.say(
+  messages_.warn(
       fmt::format("another camera or lens than the zoom curve's, or moved on its mount, or its "
                   "reading does not "
                   "follow the lens: a new curve begins at zoom {}{}{}",

@@ -42,7 +42,7 @@ void take_out(int degree, const std::vector<double>& x, std::vector<double>* y) 
 template <class ValueOf>
 DepartureColumns curve(Departure departure, FrameColumn::What what, double sign, int knots,
                        int degree, const std::vector<SeenFrame>& frames, const ValueOf& value_of) {
-  DepartureColumns out{departure, {}, {}, {}};
+  DepartureColumns out{departure, {}, {}, {}, {}};
   double low = std::numeric_limits<double>::infinity();
   double high = -low;
   for (const SeenFrame& frame : frames) {
@@ -68,7 +68,18 @@ DepartureColumns play(Departure departure, FrameColumn::What what,
                       const std::vector<SeenFrame>& frames, const HeadingOf& heading_of) {
   FrameColumn column{what, {}};
   for (const SeenFrame& frame : frames) column.of_frame.push_back(-0.5 * heading_of(frame));
-  return {departure, {}, {column}, {}};
+  return {departure, {}, {column}, {}, {}};
+}
+
+template <class NoiseOf>
+DepartureColumns noise(Departure departure, const std::vector<SeenFrame>& frames,
+                       const NoiseOf& noise_of) {
+  DepartureColumns out{departure, {}, {}, {}, {}};
+  for (const SeenFrame& frame : frames) {
+    out.noise.emplace_back(FrameNoise::Zero());
+    noise_of(frame, &out.noise.back());
+  }
+  return out;
 }
 
 }  // namespace
@@ -76,7 +87,7 @@ DepartureColumns play(Departure departure, FrameColumn::What what,
 std::vector<DepartureColumns> all_departures(const std::vector<SeenFrame>& frames) {
   using What = FrameColumn::What;
   const auto of = [](Departure departure, std::initializer_list<Parameter> parameters) {
-    DepartureColumns out{departure, {}, {}, {}};
+    DepartureColumns out{departure, {}, {}, {}, {}};
     for (const Parameter parameter : parameters) out.parameters.push_back(index(parameter));
     return out;
   };
@@ -99,7 +110,13 @@ std::vector<DepartureColumns> all_departures(const std::vector<SeenFrame>& frame
                [](const SeenFrame& frame) { return frame.heading.tilt; }),
           curve(Departure::kFocalDrift, What::kFocalLength, 1, kTimeKnots, 0, frames, time),
           curve(Departure::kPanDrift, What::kPan, -1, kTimeKnots, 0, frames, time),
-          curve(Departure::kTiltDrift, What::kTilt, -1, kTimeKnots, 0, frames, time)};
+          curve(Departure::kTiltDrift, What::kTilt, -1, kTimeKnots, 0, frames, time),
+          noise(Departure::kTimeJitter, frames,
+                [](const SeenFrame& frame, FrameNoise* out) {
+                  out->col(0).head<2>() = frame.by_all_samples.rate.vector();
+                }),
+          noise(Departure::kAngleNoise, frames,
+                [](const SeenFrame&, FrameNoise* out) { out->topRows<2>().setIdentity(); })};
 }
 
 }  // namespace alidade

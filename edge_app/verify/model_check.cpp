@@ -18,7 +18,12 @@ namespace {
 constexpr std::size_t kMostFound = 4;
 constexpr double kHuber = 3;       // sigmas of noise; a residual beyond counts less
 constexpr double kNotSeen = 1e-9;  // share of a column that nothing else explains
-constexpr int kFrameErrors = 4;    // pan, tilt, their rates
+// Amplitudes at which the likelihood of a noise is looked at first, as powers of the factor.
+constexpr double kNoiseFactor = 3;
+constexpr double kLeastJitter_s = 3e-4;
+constexpr double kLeastNoise_rad = 1e-5;
+constexpr int kNoiseSteps = 7;
+constexpr double kWorthRefining = 4;  // twice the gain of log likelihood
 
 // The equations of all pairs. Unknowns, whitened by their claimed covariance: each frame's errors,
 // the parameters, what is left of telemetry's known errors. Then the departures, and r.
@@ -29,9 +34,8 @@ class PairEquations {
                 double motion_inflation)
       : frames_(frames), pairs_(pairs), departures_(all_departures(frames)) {
     for (const SeenFrame& frame : frames) {
-      const Matrix4<double> covariance =
-          motion_inflation * frame.by_all_samples.motion_covariance.topLeftCorner<4, 4>();
-      frame_roots_.emplace_back(covariance_root(covariance));
+      claimed_.emplace_back(motion_inflation *
+                            frame.by_all_samples.motion_covariance.topLeftCorner<4, 4>());
     }
     ParameterCovariance<double> parameters = calibration.covariance;
     parameters(index(Parameter::kClockOffset), index(Parameter::kClockOffset)) +=
@@ -42,6 +46,8 @@ class PairEquations {
       columns_ += departure.count();
       add_known(departure, telemetry_error);
     }
+    noise_size_.assign(departures_.size(), 0);
+    set_roots();
   }
 
   [[nodiscard]] const std::vector<DepartureColumns>& departures() const { return departures_; }
@@ -49,16 +55,17 @@ class PairEquations {
 
   // Sums the equations up, with the noise that residuals show.
   void sum() {
+    add_up_pairs();
     add_up();
     solve();
     measure_noise();
-    add_up();
-    solve();
+    add_up_pairs();
+    pair_scatter_ = pair_scatter();
   }
 
   // `d` against the present unknowns.
-  [[nodiscard]] DepartureTest test(std::size_t d) const {
-    DepartureTest out = test(std::vector<std::size_t>{d});
+  [[nodiscard]] DepartureTest test(std::size_t d) {
+    DepartureTest out = is_noise(d) ? test_noise(d) : test(std::vector<std::size_t>{d});
     out.departure = departures_[d].departure;
     out.at = departures_[d].at;
     out.claimed_sigma = claimed_sigma(d);
@@ -86,11 +93,19 @@ class PairEquations {
     return out;
   }
 
-  // From now on these departures have any size, and no others.
+  // From now on these departures have any size, and no others. A noise has its likeliest size.
   void set_free(const std::vector<std::size_t>& departures) {
     free_ = columns_at(departures);
+    std::fill(noise_size_.begin(), noise_size_.end(), 0);
+    set_roots();
+    for (const std::size_t d : departures) {
+      if (is_noise(d)) noise_size_[d] = likeliest(d).size;
+      set_roots();
+    }
+    add_up();
     solve();
   }
+  [[nodiscard]] bool is_noise(std::size_t d) const { return !departures_[d].noise.empty(); }
 
  private:
   [[nodiscard]] double claimed_sigma(std::size_t d) const {
@@ -142,20 +157,24 @@ class PairEquations {
                                           const PlaceRow& place) {
     const double first = column.of_frame[pair.first];
     const double second = column.of_frame[pair.second];
-    if (column.what == FrameColumn::What::kFocalLength) {
-      const int f = index(Parameter::kFocalLength);
-      return place.P_first.col(f) * first + place.P_second.col(f) * second;
+    switch (column.what) {
+      case FrameColumn::What::kPan:
+        return place.J_first.col(0) * first + place.J_second.col(0) * second;
+      case FrameColumn::What::kTilt:
+        return place.J_first.col(1) * first + place.J_second.col(1) * second;
+      case FrameColumn::What::kFocalLength:
+        break;
     }
-    const int axis = column.what == FrameColumn::What::kPan ? 0 : 1;
-    return place.J_first.col(axis) * first + place.J_second.col(axis) * second;
+    const int f = index(Parameter::kFocalLength);
+    return place.P_first.col(f) * first + place.P_second.col(f) * second;
   }
 
-  // Row pair of one place: errors of both frames, what is shared, departures, r.
+  // Row pair of one place: errors of both frames (not whitened), what is shared, departures, r.
   [[nodiscard]] Eigen::Matrix<double, 2, Eigen::Dynamic> row(const PairRows& pair,
                                                              const PlaceRow& place) const {
     Eigen::Matrix<double, 2, Eigen::Dynamic> out(2, 2 * kFrameErrors + shared() + columns_ + 1);
-    out.leftCols<kFrameErrors>() = place.J_first * frame_roots_[pair.first];
-    out.middleCols<kFrameErrors>(kFrameErrors) = place.J_second * frame_roots_[pair.second];
+    out.leftCols<kFrameErrors>() = place.J_first;
+    out.middleCols<kFrameErrors>(kFrameErrors) = place.J_second;
     const Sensitivity<2> P = place.P_first + place.P_second;
     int at = 2 * kFrameErrors;
     out.middleCols<kParameterCount>(at) = P * parameter_root_;
@@ -180,8 +199,7 @@ class PairEquations {
     return out;
   }
 
-  void add_up() {
-    sums_ = Eigen::MatrixXd::Zero(last() + 1, last() + 1);
+  void add_up_pairs() {
     of_pair_.clear();
     std::size_t n = 0;
     for (const PairRows& pair : pairs_) {
@@ -192,12 +210,51 @@ class PairEquations {
         const Eigen::Matrix<double, 2, Eigen::Dynamic> rows = row(pair, place);
         own.noalias() += rows.transpose() * (weight * place.covariance.inverse()) * rows;
       }
+      of_pair_.push_back(std::move(own));
+    }
+  }
+
+  // The frames' claimed covariances, with the noises as they are taken to be.
+  void set_roots() {
+    frame_roots_.clear();
+    for (std::size_t i = 0; i < frames_.size(); ++i) {
+      Matrix4<double> covariance = claimed_[i];
+      for (std::size_t d = 0; d < departures_.size(); ++d) {
+        if (noise_size_[d] == 0) continue;
+        const FrameNoise B = noise_size_[d] * departures_[d].noise[i];
+        covariance += B * B.transpose();
+      }
+      frame_roots_.emplace_back(covariance_root(covariance));
+    }
+  }
+
+  // From columns of whitened errors of the pair's frames to columns of the errors.
+  void unwhiten(const PairRows& pair, Eigen::MatrixXd* rows) const {
+    rows->topRows<kFrameErrors>() =
+        (frame_roots_[pair.first] * rows->topRows<kFrameErrors>()).eval();
+    rows->middleRows<kFrameErrors>(kFrameErrors) =
+        (frame_roots_[pair.second] * rows->middleRows<kFrameErrors>(kFrameErrors)).eval();
+  }
+
+  // picture_variance: factor of the pictures' noise.
+  void add_up(double picture_variance = 1) {
+    sums_ = Eigen::MatrixXd::Zero(last() + 1, last() + 1);
+    for (std::size_t p = 0; p < pairs_.size(); ++p) {
+      const PairRows& pair = pairs_[p];
+      Eigen::MatrixXd own = of_pair_[p] / picture_variance;
+      const auto whiten = [&own](int from, const Matrix4<double>& root) {
+        own.middleRows<kFrameErrors>(from) =
+            (root.transpose() * own.middleRows<kFrameErrors>(from)).eval();
+        own.middleCols<kFrameErrors>(from) = (own.middleCols<kFrameErrors>(from) * root).eval();
+      };
+      whiten(0, frame_roots_[pair.first]);
+      whiten(kFrameErrors, frame_roots_[pair.second]);
       const std::vector<int> at = places_of(pair);
+      const auto size = static_cast<int>(own.rows());
       for (int i = 0; i < size; ++i) {
         for (int j = 0; j < size; ++j)
           sums_(at[static_cast<std::size_t>(i)], at[static_cast<std::size_t>(j)]) += own(i, j);
       }
-      of_pair_.push_back(std::move(own));
     }
   }
 
@@ -209,40 +266,175 @@ class PairEquations {
     return out;
   }
 
-  void solve() {
+  // The normal equations with what is free, and their right side.
+  void fill(Eigen::MatrixXd* N, Eigen::VectorXd* g) const {
     const int n = unknowns();
     const int more = static_cast<int>(free_.size());
-    Eigen::MatrixXd N = Eigen::MatrixXd::Zero(n + more, n + more);
-    N.topLeftCorner(n, n) = sums_.topLeftCorner(n, n);
-    N.topLeftCorner(n, n).diagonal().array() += 1;  // the claimed covariances
-    Eigen::VectorXd g(n + more);
-    g.head(n) = sums_.block(0, last(), n, 1);
+    *N = Eigen::MatrixXd::Zero(n + more, n + more);
+    N->topLeftCorner(n, n) = sums_.topLeftCorner(n, n);
+    N->topLeftCorner(n, n).diagonal().array() += 1;  // the claimed covariances
+    *g = Eigen::VectorXd(n + more);
+    g->head(n) = sums_.block(0, last(), n, 1);
     for (int a = 0; a < more; ++a) {
       const int column = free_[static_cast<std::size_t>(a)];
-      N.block(0, n + a, n, 1) = sums_.block(0, column, n, 1);
-      N.block(n + a, 0, 1, n) = N.block(0, n + a, n, 1).transpose();
+      N->block(0, n + a, n, 1) = sums_.block(0, column, n, 1);
+      N->block(n + a, 0, 1, n) = N->block(0, n + a, n, 1).transpose();
       for (int b = 0; b < more; ++b)
-        N(n + a, n + b) = sums_(column, free_[static_cast<std::size_t>(b)]);
+        (*N)(n + a, n + b) = sums_(column, free_[static_cast<std::size_t>(b)]);
       // What the recording does not show of it stays where it is.
-      N(n + a, n + a) *= 1 + kNotSeen;
-      g[n + a] = sums_(column, last());
+      (*N)(n + a, n + a) *= 1 + kNotSeen;
+      (*g)[n + a] = sums_(column, last());
     }
+  }
+
+  void solve() {
+    Eigen::MatrixXd N;
+    Eigen::VectorXd g;
+    fill(&N, &g);
     information_.compute(N);
     solution_ = information_.solve(g);
+  }
+
+  // But for a constant. What is free counts as in restricted maximum likelihood.
+  double log_likelihood(std::size_t d, double size, double picture_variance) {
+    noise_size_[d] = size;
+    set_roots();
+    add_up(picture_variance);
+    Eigen::MatrixXd N;
+    Eigen::VectorXd g;
+    fill(&N, &g);
+    const Eigen::LDLT<Eigen::MatrixXd> factor(N);
+    return 0.5 * g.dot(factor.solve(g)) - 0.5 * factor.vectorD().array().abs().log().sum();
+  }
+
+  struct Likeliest {
+    double size = 0, sigma = 0;
+    double gain = 0;  // twice that of log likelihood over a size of 0
+  };
+  Likeliest likeliest(std::size_t d, double picture_variance) {
+    const double least =
+        departures_[d].departure == Departure::kTimeJitter ? kLeastJitter_s : kLeastNoise_rad;
+    const double without = log_likelihood(d, 0, picture_variance);
+    const auto gain_at = [&](double size) {
+      return 2 * (log_likelihood(d, size, picture_variance) - without);
+    };
+    std::vector<double> gains;
+    for (int i = 0; i < kNoiseSteps; ++i) {
+      gains.push_back(gain_at(least * std::pow(kNoiseFactor, i)));
+      if (gains.back() < -kWorthRefining) break;
+    }
+    const auto best = std::max_element(gains.begin(), gains.end());
+    const auto at = static_cast<double>(best - gains.begin());
+    Likeliest out;
+    if (!(*best > 0)) {
+      // Where the likelihood has fallen by 1/2.
+      std::size_t i = 0;
+      while (i + 1 < gains.size() && gains[i] > -1) ++i;
+      out.sigma = least * std::pow(kNoiseFactor, static_cast<double>(i));
+      return out;
+    }
+    double step = std::log(kNoiseFactor);
+    double centre = std::log(least) + at * step;
+    out = {std::exp(centre), std::exp(centre), *best};
+    if (*best < kWorthRefining) return out;
+    for (int round = 0; round < 3; ++round) {
+      const double below = gain_at(std::exp(centre - step));
+      const double above = gain_at(std::exp(centre + step));
+      const double curvature = below - 2 * out.gain + above;
+      if (!(curvature < 0)) break;
+      centre += std::clamp(0.5 * (below - above) / curvature, -1.0, 1.0) * step;
+      out.size = std::exp(centre);
+      // Of log size; twice the log likelihood falls by its square.
+      out.sigma = out.size * step * std::sqrt(-2 / curvature);
+      out.gain = gain_at(out.size);
+      step /= 3;
+    }
+    return out;
+  }
+
+  // Errors that the places of a pair share look like noise of its frames. So the pictures' noise is
+  // taken to be as large as what pairs share is in the residuals, where frames may err at will.
+  Likeliest likeliest(std::size_t d) { return likeliest(d, pair_scatter_); }
+
+  // Variance of the mean residual of a pair's places, over that of independent places.
+  [[nodiscard]] double pair_scatter() {
+    constexpr double kAtWill_rad = 0.03;
+    constexpr double kLeastFreedom = 8;
+    for (const bool errs : {true, false}) {
+      for (std::size_t d = 0; d < departures_.size(); ++d) {
+        if (departures_[d].departure == Departure::kAngleNoise)
+          noise_size_[d] = errs ? kAtWill_rad : 0;
+      }
+      set_roots();
+      add_up();
+      solve();
+      if (errs) measure_pairs();
+    }
+    std::vector<bool> is_seen(frames_.size(), false);
+    for (const PairRows& pair : pairs_) is_seen[pair.first] = is_seen[pair.second] = true;
+    const auto seen = static_cast<double>(std::count(is_seen.begin(), is_seen.end(), true));
+    const double freedom = 2 * (static_cast<double>(pairs_.size()) - seen + 1);
+    if (freedom < kLeastFreedom) return std::numeric_limits<double>::infinity();
+    return std::max(1.0, shared_square_ / freedom);
+  }
+
+  // Leaves the size of `d` and the sums as they were.
+  DepartureTest test_noise(std::size_t d) {
+    DepartureTest out;
+    if (!std::isfinite(pair_scatter_)) return out;
+    const double before = noise_size_[d];
+    const Likeliest found = likeliest(d);
+    noise_size_[d] = before;
+    set_roots();
+    add_up();
+    solve();
+    out.freedom = 1;
+    out.chi_square = found.gain;
+    constexpr double kHalf = -0.6931471805599453;  // log: in the other half the likeliest is 0
+    if (found.gain > 0) out.log_chance = internal::log_chance(found.gain, 1) + kHalf;
+    out.size = {found.size};
+    out.sigma = {found.sigma};
+    return out;
+  }
+
+  // What the solution leaves of the residuals of a pair, place by place.
+  [[nodiscard]] std::vector<Vector2<double>> left_of(const PairRows& pair) const {
+    Eigen::VectorXd x(2 * kFrameErrors + shared());
+    const auto of_frame = [this](std::size_t frame) -> Vector4<double> {
+      return frame_roots_[frame] *
+             solution_.segment<kFrameErrors>(kFrameErrors * static_cast<int>(frame));
+    };
+    x << of_frame(pair.first), of_frame(pair.second),
+        solution_.segment(kFrameErrors * static_cast<int>(frames_.size()), shared());
+    std::vector<Vector2<double>> out;
+    for (const PlaceRow& place : pair.places)
+      out.emplace_back(place.residual - row(pair, place).leftCols(x.size()) * x);
+    return out;
+  }
+
+  // Sum over the pairs of chi-square of a shift that is common to all places of a pair.
+  void measure_pairs() {
+    shared_square_ = 0;
+    std::size_t n = 0;
+    for (const PairRows& pair : pairs_) {
+      const std::vector<Vector2<double>> left = left_of(pair);
+      Matrix2<double> information = Matrix2<double>::Zero();
+      Vector2<double> sum = Vector2<double>::Zero();
+      for (std::size_t i = 0; i < left.size(); ++i) {
+        const Matrix2<double> weight = weights_[n++] * pair.places[i].covariance.inverse();
+        information += weight;
+        sum += weight * left[i];
+      }
+      shared_square_ += sum.dot(information.inverse() * sum);
+    }
   }
 
   void measure_noise() {
     std::vector<double> squares;
     for (const PairRows& pair : pairs_) {
-      Eigen::VectorXd x(2 * kFrameErrors + shared());
-      x << solution_.segment<kFrameErrors>(kFrameErrors * static_cast<int>(pair.first)),
-          solution_.segment<kFrameErrors>(kFrameErrors * static_cast<int>(pair.second)),
-          solution_.segment(kFrameErrors * static_cast<int>(frames_.size()), shared());
-      for (const PlaceRow& place : pair.places) {
-        const Eigen::Matrix<double, 2, Eigen::Dynamic> rows = row(pair, place);
-        const Vector2<double> left = place.residual - rows.leftCols(x.size()) * x;
-        squares.push_back(left.dot(place.covariance.inverse() * left));
-      }
+      const std::vector<Vector2<double>> left = left_of(pair);
+      for (std::size_t i = 0; i < left.size(); ++i)
+        squares.push_back(left[i].dot(pair.places[i].covariance.inverse() * left[i]));
     }
     if (squares.empty()) return;
     const double of_noise = median(squares) / (2 * std::log(2.0));
@@ -278,6 +470,7 @@ class PairEquations {
       for (int i = 0; i < n; ++i)
         change(at[static_cast<std::size_t>(i)] - unknowns() + x_count, i) += 1;
       change(own.rows() - 1, n) = 1;
+      unwhiten(pairs_[p], &change);
       const Eigen::MatrixXd product = own * change;
       for (int i = 0; i < n; ++i) {
         const double part = change.col(i).dot(product.col(n));
@@ -326,13 +519,17 @@ class PairEquations {
   std::vector<int> first_column_;
   int columns_ = 0;
   std::vector<FrameColumn> known_;
+  std::vector<Matrix4<double>> claimed_;  // covariances of the frames' errors
+  std::vector<double> noise_size_;        // of each departure; 0: none, or not a noise
   std::vector<Matrix4<double>> frame_roots_;
   Eigen::Matrix<double, kParameterCount, kParameterCount> parameter_root_;
   std::vector<double> weights_;  // of each place, in order; empty: 1
   double noise_ratio_ = 1;
+  double shared_square_ = 0;
+  double pair_scatter_ = 1;
   std::vector<int> free_;
   Eigen::MatrixXd sums_;
-  std::vector<Eigen::MatrixXd> of_pair_;
+  std::vector<Eigen::MatrixXd> of_pair_;  // with errors of the frames that are not whitened
   Eigen::LDLT<Eigen::MatrixXd> information_;
   Eigen::VectorXd solution_;
 };
@@ -408,6 +605,26 @@ std::vector<std::size_t> best_of(const std::vector<std::size_t>& found, double l
   return best;
 }
 
+// Those that remain improbable beside the others. As jitter and noise may have any size, they can
+// explain some of what was found before them.
+std::vector<std::size_t> still_found(std::vector<std::size_t> found, double log_limit,
+                                     PairEquations* equations) {
+  while (!found.empty()) {
+    std::optional<std::size_t> weakest;
+    double most = log_limit;
+    for (const std::size_t d : found) {
+      equations->set_free(without(found, d));
+      const double log_chance = equations->test(d).log_chance;
+      if (log_chance < most) continue;
+      most = log_chance;
+      weakest = d;
+    }
+    if (!weakest) break;
+    found = without(found, *weakest);
+  }
+  return found;
+}
+
 }  // namespace
 
 ModelCheckResult check_model(const std::vector<SeenFrame>& frames,
@@ -424,7 +641,11 @@ ModelCheckResult check_model(const std::vector<SeenFrame>& frames,
   for (std::size_t d = 0; d < equations.departures().size(); ++d)
     out.tests.push_back(equations.test(d));
   std::vector<std::size_t> found = found_in_turn(log_limit, &equations);
-  if (found.size() > 1) found = best_of(found, log_limit, &equations);
+  const bool has_noise =
+      std::any_of(found.begin(), found.end(), [&](std::size_t d) { return equations.is_noise(d); });
+  if (found.size() > 1)
+    found = has_noise ? still_found(found, log_limit, &equations)
+                      : best_of(found, log_limit, &equations);
   for (const std::size_t d : found) {
     equations.set_free(without(found, d));
     out.found.push_back(equations.test(d));

@@ -6,6 +6,9 @@
 // A departure adds Z a to r, with known columns Z and unknown size a. With C the claimed covariance
 // of r
 //   s = Z^T C^-1 r,   V = Z^T C^-1 Z,   s^T V^-1 s ~ chi-square if a is 0           (score test)
+// Jitter and noise of telemetry add to C instead: a^2 B_i B_i^T to the covariance of frame i's
+// errors. a maximises the likelihood; twice the logarithm of its gain over a = 0 is 0 or, in half
+// of the cases, chi-square with one degree of freedom if a is 0.
 // The noise of the pictures is measured: by the residuals, and by the scatter of the pairs' parts
 // of s. Departures are found one after the other, the least probable first, until none is
 // improbable or four are found; of these the ones are kept that explain most for their number. rad,
@@ -37,6 +40,8 @@ enum class Departure : int {
   kFocalDrift,  // f changes during the recording
   kPanDrift,    // telemetry's zero of pan changes during the recording
   kTiltDrift,   // likewise
+  kTimeJitter,  // each sample's time has an error of its own, beyond its claimed sigma
+  kAngleNoise,  // likewise its angles
   kCount
 };
 inline constexpr int kDepartureCount = static_cast<int>(Departure::kCount);
@@ -50,7 +55,8 @@ struct DepartureTest {
   // by it.
   double scatter = 1;
   // Size by this recording alone, and its sigma: px, 1, rad or s; of a curve at its knots, in the
-  // order of `at`. Truth minus calibration; of gears and drifts of the zero: telemetry minus truth.
+  // order of `at`. Truth minus calibration; of gears and drifts of the zero: telemetry minus truth;
+  // of jitter and noise: RMS, s or rad, its sigma from the likelihood's fall by 1/2.
   std::vector<double> size, sigma;
   std::vector<double> at;    // rad or s; empty: not a curve
   double claimed_sigma = 0;  // of a parameter, by the calibration; 0: not a parameter

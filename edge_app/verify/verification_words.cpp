@@ -160,6 +160,10 @@ const char* name_of(Departure departure) {
       return "zero of pan that drifts";
     case Departure::kTiltDrift:
       return "zero of tilt that drifts";
+    case Departure::kTimeJitter:
+      return "jitter of telemetry's times";
+    case Departure::kAngleNoise:
+      return "noise of telemetry's angles";
     case Departure::kCount:
       break;
   }
@@ -182,6 +186,10 @@ std::string size_of(const DepartureTest& test) {
     for (const double size : shown) square += (size - mean) * (size - mean);
     return fmt::format("RMS {:.3g}{}, {:.1f} sigmas at most", unit * std::sqrt(square / n), name,
                        largest_sigmas(test));
+  };
+  const auto noise = [&test](double unit, const char* name) {
+    return fmt::format("RMS {:.2g} +- {:.1g}{} beyond what is stated", unit * test.size.front(),
+                       unit * test.sigma.front(), name);
   };
   constexpr double kMilli = 1e3;
   constexpr double kMicro = 1e6;
@@ -213,6 +221,10 @@ std::string size_of(const DepartureTest& test) {
       return curve(kMilli, " mrad");
     case Departure::kFocalDrift:
       return curve(1, " px");
+    case Departure::kTimeJitter:
+      return noise(kMilli, " ms");
+    case Departure::kAngleNoise:
+      return noise(kMilli, " mrad");
     case Departure::kCount:
       break;
   }

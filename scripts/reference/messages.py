@@ -45,16 +45,32 @@ def line(text):
     return re.sub(r"\s+", " ", text).replace("|", "\\|").strip()
 
 
+def said(argument):
+    """Of a literal, a literal and more, or fmt::format() of one; None for something else."""
+    if argument.startswith("fmt::format("):
+        argument = cpp.arguments(argument, argument.index("("))[0]
+    begin, plus, _ = argument.partition('" +')
+    return cpp.string(begin + '"') + "…" if plus else cpp.string(argument)
+
+
+# What the calibration thread has for the log, and its name there.
+OF_CALIBRATION = {"messages_.warn": "calibration: ", "messages_.warn_once": "calibration: "}
+
+
 def log_lines():
     """The texts of warnings and errors."""
     found = {}
     for path in sorted((cpp.TOP / "edge_app").rglob("*")):
         if path.suffix in (".h", ".cpp"):
             name = path.relative_to(cpp.TOP).as_posix()
-            for kind, a in cpp.calls(cpp.text_of(name), ("spdlog::warn", "spdlog::error")):
+            text_of_file = cpp.text_of(name)
+            for kind, a in cpp.calls(text_of_file, ("spdlog::warn", "spdlog::error")):
                 text = cpp.string(a[0]) if a else None
                 if text and re.search(r"[a-z]{3}", re.sub(r"\{[^}]*\}", "", text)):
                     found[line(text)] = kind.rpartition(":")[2]
+            for kind, a in cpp.calls(text_of_file, tuple(OF_CALIBRATION)):
+                if text := said(a[0]):
+                    found[line(OF_CALIBRATION[kind] + text)] = "warn"
     return found
 
 

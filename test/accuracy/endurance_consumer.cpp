@@ -110,7 +110,8 @@ void EnduranceConsumer::calibrate(double now_s) {
   for (; !waiting_.empty(); waiting_.pop_front()) feed(waiting_.front());
   const bool due = calibrating_->due();
   auto outcome = calibrating_->work();
-  for (std::string& line : calibrating_->take_messages()) messages_.push_back(std::move(line));
+  for (CalibrationMessage& message : calibrating_->take_messages())
+    messages_.push_back(std::move(message.text));
   report_ = calibrating_->report();
   if (report_.activity != said_.activity || report_.need != said_.need) {
     messages_.push_back(std::string(to_string(report_.activity)) +

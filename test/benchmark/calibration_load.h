@@ -73,7 +73,7 @@ class CalibrationThread {
   [[nodiscard]] int publications() const { return publications_; }
   [[nodiscard]] double cpu_share() const { return wall_s_ > 0 ? cpu_s_ / wall_s_ : 0; }
   [[nodiscard]] double wall_s() const { return wall_s_; }
-  [[nodiscard]] std::vector<std::string> messages() { return calibration_->take_messages(); }
+  [[nodiscard]] std::vector<CalibrationMessage> messages() { return calibration_->take_messages(); }
 
  private:
   void run();

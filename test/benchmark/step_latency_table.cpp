@@ -208,7 +208,8 @@ bool run(const RealtimeOptions& options, LatencyReport* report) {
     while (without.frames.size() < with.frames.size()) without.frames.push_back(live.next_frame());
     add(between, live.uses(), &without.uses);
   }
-  for (const std::string& line : calibration.messages()) std::printf("%s\n", line.c_str());
+  for (const CalibrationMessage& message : calibration.messages())
+    std::printf("%s\n", message.text.c_str());
   if (with.frames.empty()) return false;
 
   Condition adopting;

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "core/calibration/number_text.h"
 #include "test/support/zoom_by_formula.h"
 
 namespace alidade {
@@ -71,6 +72,21 @@ TEST(ZoomReport, HoldsCurvesDwellsAndMovements) {
        at = page.find("class=\"area a\"", at + 1))
     ++bands;
   EXPECT_EQ(bands, 5U);
+}
+
+// As in the table that `calibrate` prints: one zoom must not seem to have another f here.
+TEST(ZoomReport, HasTheFocalLengthOfAllTogetherBesideEachAlone) {
+  Zooms zooms;
+  zooms.dwells[2].own.camera.focal_length *= 1.001;
+  const std::string page = zooms.page();
+  const Calibration node = zooms.fit.curve.node(2);
+  const double sigma = parameter_sigma(node, Parameter::kFocalLength);
+  EXPECT_THAT(page,
+              HasSubstr(fmt::format(
+                  "<tr><td>{:g}</td><td>{}</td><td>{}</td><td>{}</td>", *node.zoom,
+                  value_text(node.camera.focal_length, sigma), sigma_text(sigma),
+                  value_text(zooms.dwells[2].own.camera.focal_length,
+                             parameter_sigma(zooms.dwells[2].own, Parameter::kFocalLength)))));
 }
 
 TEST(ZoomReport, SaysThatAllIsWellOnlyIfItIs) {

@@ -11,6 +11,7 @@
 #include <optional>
 #include <random>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "edge_app/self_calibration/self_calibration.h"
@@ -171,6 +172,22 @@ inline std::vector<Published> feed(SelfCalibration* calibration, const Simulatio
     if (auto news = calibration->work()) published.push_back({news, frame.stamp_s});
   }
   return published;
+}
+
+// What it has for the log since the last call.
+inline std::vector<std::string> lines_of(SelfCalibration& calibration) {
+  std::vector<std::string> out;
+  for (CalibrationMessage& message : calibration.take_messages())
+    out.push_back(std::move(message.text));
+  return out;
+}
+// Of these the warnings.
+inline std::vector<std::string> warnings_of(SelfCalibration& calibration) {
+  std::vector<std::string> out;
+  for (CalibrationMessage& message : calibration.take_messages()) {
+    if (message.is_warning) out.push_back(std::move(message.text));
+  }
+  return out;
 }
 
 inline void expect_truth(const Simulation& s, const Calibration& c) {

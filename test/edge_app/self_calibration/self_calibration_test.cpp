@@ -56,8 +56,8 @@ TEST(SelfCalibration, BeginsWithTheDataSheetAndPublishesOnceTheMotionSuffices) {
   EXPECT_EQ(calibration.report().activity, CalibrationActivity::kWatching);
   EXPECT_EQ(calibration.report().need, CalibrationNeed::kNothing);
   EXPECT_FALSE(calibration.progress());
-  EXPECT_THAT(calibration.take_messages(), Contains(HasSubstr("calibrated from")));
-  EXPECT_THAT(calibration.take_messages(), IsEmpty());
+  EXPECT_THAT(test::lines_of(calibration), Contains(HasSubstr("calibrated from")));
+  EXPECT_THAT(test::lines_of(calibration), IsEmpty());
 }
 
 TEST(SelfCalibration, HearsNothingWhileItIsNotAutomatic) {
@@ -86,7 +86,7 @@ TEST_P(SelfCalibrationNeeds, SaysWhatIsMissingAndPublishesNothing) {
   EXPECT_THAT(feed(&calibration, s, {}), IsEmpty());
   EXPECT_EQ(calibration.report().activity, CalibrationActivity::kCollecting);
   EXPECT_STREQ(to_string(calibration.report().need), to_string(GetParam().need));
-  EXPECT_THAT(calibration.take_messages(), Contains(HasSubstr("not calibrated yet")));
+  EXPECT_THAT(test::lines_of(calibration), Contains(HasSubstr("not calibrated yet")));
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -214,7 +214,7 @@ TEST_F(StarvedCalibration, SucceedsWithOneInThreePictures) {
 TEST_F(StarvedCalibration, SaysThatTheMachineIsTooBusyAndDoesNotBlameTelemetry) {
   EXPECT_THAT(starve(0.15, 1, 10), IsEmpty());
   EXPECT_STREQ(to_string(calibration_.report().need), to_string(CalibrationNeed::kPictures));
-  EXPECT_THAT(calibration_.take_messages(),
+  EXPECT_THAT(test::lines_of(calibration_),
               AllOf(Not(IsEmpty()), Each(HasSubstr("% of the pictures came here")),
                     Each(Not(HasSubstr("telemetry does not")))));
 }
@@ -227,7 +227,7 @@ TEST(SelfCalibration, DoesNotBlameTelemetryForWhatItDoesNotAccompany) {
   Feed lost;
   lost.head_back_s = options.schedule.first_try_s - 1;
   const auto published = feed(&calibration, s, lost);
-  const std::vector<std::string> messages = calibration.take_messages();
+  const std::vector<std::string> messages = test::lines_of(calibration);
   ASSERT_GE(messages.size(), 2U);
   EXPECT_THAT(messages[0], HasSubstr("telemetry accompanies less than half of the video"));
   EXPECT_THAT(messages, Each(Not(HasSubstr("telemetry does not describe"))));
@@ -284,7 +284,7 @@ TEST(SelfCalibration, FindsTheOpticalCentreAndKeepsIt) {
   const Calibration& after = refined.back().calibration->calibration;
   EXPECT_EQ(after.camera.centre_offset(), before.camera.centre_offset());
   EXPECT_LT(after.covariance(0, 0), before.covariance(0, 0));
-  EXPECT_THAT(calibration.take_messages(),
+  EXPECT_THAT(test::lines_of(calibration),
               Not(Contains(HasSubstr("the camera is not what the calibration says"))));
 }
 
@@ -321,7 +321,7 @@ TEST(SelfCalibration, KeepsTheOldCalibrationUntilTheFreshOneIsThereAndSaysWhatTh
   const test::Simulation s = camera();
   SelfCalibration calibration(options_for(s), nullptr);
   ASSERT_FALSE(feed(&calibration, s, {}).empty());
-  static_cast<void>(calibration.take_messages());
+  static_cast<void>(test::lines_of(calibration));
   EXPECT_TRUE(calibration.ask_for_fresh());
   test::Simulation still = s;
   still.path = [](double) { return Eigen::Vector2d(0.1, 0.05); };
@@ -337,7 +337,7 @@ TEST(SelfCalibration, KeepsTheOldCalibrationUntilTheFreshOneIsThereAndSaysWhatTh
   EXPECT_EQ(calibration.report().need, CalibrationNeed::kMotion);
   ASSERT_TRUE(calibration.progress());
   EXPECT_THAT(calibration.progress()->refusal, HasSubstr("no fresh calibration yet (no motion)"));
-  EXPECT_THAT(calibration.take_messages(), Contains(HasSubstr("no fresh calibration yet")));
+  EXPECT_THAT(test::lines_of(calibration), Contains(HasSubstr("no fresh calibration yet")));
 }
 
 // Where in its interval a device answers, it does so in every poll, however many there are.
@@ -370,7 +370,7 @@ TEST(SelfCalibration, ReplacesTheCalibrationOfACameraThatWasTurnedOnItsMount) {
   const auto published = feed(&calibration, turned, later_in_oe_mode());
   ASSERT_FALSE(published.empty());
   expect_truth(turned, published.back().calibration->calibration);
-  EXPECT_THAT(calibration.take_messages(),
+  EXPECT_THAT(test::lines_of(calibration),
               Contains(HasSubstr("the camera is not what the calibration says")));
 }
 
@@ -380,7 +380,7 @@ TEST(SelfCalibration, WidensWhatIsContradictedWhenTheDelayBeginsToWander) {
   SelfCalibration calibration(options_for(s), nullptr);
   ASSERT_FALSE(feed(&calibration, s, {}).empty());
   const Calibration before = calibration.first()->calibration;
-  static_cast<void>(calibration.take_messages());
+  static_cast<void>(test::lines_of(calibration));
   test::Simulation turned = s;
   turned.pan_axis = (s.pan_axis + Eigen::Vector3d(0, 0.005, 0)).normalized();
   turned.tilt_axis = (s.tilt_axis + Eigen::Vector3d(0.005, 0, 0)).normalized();
@@ -391,7 +391,7 @@ TEST(SelfCalibration, WidensWhatIsContradictedWhenTheDelayBeginsToWander) {
   how.first_frame = 1000;
   bool contradicted = false;
   how.wander_at = [&](double) {
-    for (const std::string& line : calibration.take_messages()) {
+    for (const std::string& line : test::lines_of(calibration)) {
       contradicted = contradicted || line.find("not what the calibration says") != line.npos;
     }
     return contradicted ? 0.05 : 0.0;
@@ -425,7 +425,7 @@ TEST(SelfCalibration, WithdrawsWhatLandmarksContradictForLong) {
             before.back().calibration->calibration.covariance + options.data_sheet.covariance);
   EXPECT_GT(parameter_sigma(published[0].calibration->calibration, Parameter::kFocalLength), 0);
   EXPECT_EQ(calibration.report().activity, CalibrationActivity::kDoubtful);
-  EXPECT_THAT(calibration.take_messages(), Contains(HasSubstr("is withdrawn")));
+  EXPECT_THAT(test::lines_of(calibration), Contains(HasSubstr("is withdrawn")));
   // And the camera, followed anew, is calibrated again.
   const auto again = feed(&calibration, s,
                           {FrameTracks::Tracker::kStartUp,
@@ -460,7 +460,7 @@ TEST(SelfCalibration, KeepsAContradictedCalibrationIfItIsNotAutomatic) {
   EXPECT_EQ(calibration.first()->calibration.covariance, kept.covariance);
   EXPECT_EQ(calibration.report().activity, CalibrationActivity::kOff);
   EXPECT_THAT(
-      calibration.take_messages(),
+      test::lines_of(calibration),
       Contains(AllOf(HasSubstr("stays in use"), HasSubstr("calibration.auto is false"))).Times(1));
 }
 
@@ -520,7 +520,7 @@ TEST(SelfCalibration, SaysThatPicturesAreRepeatedAndDoesNotBlameTelemetry) {
   how.converted = 0.6;
   EXPECT_THAT(feed(&calibration, s, how), IsEmpty());
   EXPECT_EQ(calibration.report().need, CalibrationNeed::kFreshPictures);
-  EXPECT_THAT(calibration.take_messages(),
+  EXPECT_THAT(test::lines_of(calibration),
               ::testing::ElementsAre(AllOf(HasSubstr("pictures are repeated: up to 40 %"),
                                            Not(HasSubstr("positive")))));
 }
@@ -530,7 +530,7 @@ TEST(SelfCalibration, NeitherWithdrawsNorCalibratesWhileTheDelayWanders) {
   const test::Simulation s = camera();
   SelfCalibration calibration(options_for(s), nullptr);
   ASSERT_FALSE(feed(&calibration, s, {}).empty());
-  static_cast<void>(calibration.take_messages());
+  static_cast<void>(test::lines_of(calibration));
   Feed how;
   how.tracker = FrameTracks::Tracker::kOe;
   how.from_s = 20;
@@ -540,7 +540,7 @@ TEST(SelfCalibration, NeitherWithdrawsNorCalibratesWhileTheDelayWanders) {
   EXPECT_THAT(feed(&calibration, s, how), IsEmpty());
   EXPECT_EQ(calibration.report().activity, CalibrationActivity::kWatching);
   EXPECT_EQ(calibration.report().need, CalibrationNeed::kSteadyDelay);
-  EXPECT_THAT(calibration.take_messages(),
+  EXPECT_THAT(test::lines_of(calibration),
               ::testing::ElementsAre(AllOf(HasSubstr("wander by 50 ms"), HasSubstr("relay"))));
   // As soon as it holds again the offset to telemetry is found anew, as of a new connection.
   test::Simulation later = s;
@@ -695,7 +695,7 @@ TEST(SelfCalibration, KeepsWhatAFullDiskDoesNotTakeAndTriesAgain) {
   archive.full = true;
   SelfCalibration calibration(options_for(s), &archive);
   ASSERT_FALSE(feed(&calibration, s, {}).empty());
-  EXPECT_THAT(calibration.take_messages(),
+  EXPECT_THAT(test::lines_of(calibration),
               Contains(AllOf(HasSubstr("disk full"), HasSubstr("tried again"))));
   archive.full = false;
   PanTiltSample later;
@@ -705,7 +705,7 @@ TEST(SelfCalibration, KeepsWhatAFullDiskDoesNotTakeAndTriesAgain) {
   static_cast<void>(calibration.work());
   EXPECT_EQ(archive.tries, 1);
   EXPECT_FALSE(archive.has_pending());
-  EXPECT_THAT(calibration.take_messages(), Contains("the calibration is stored now"));
+  EXPECT_THAT(test::lines_of(calibration), Contains("the calibration is stored now"));
 }
 
 TEST(SelfCalibration, CancelledItPublishesNothingMore) {
@@ -740,7 +740,7 @@ TEST(SelfCalibration, CancelledWhileItAdjustsItDoesNotSayThatItFailed) {
   feed(&calibration, s, how);
   ASSERT_TRUE(cancelling.joinable());
   cancelling.join();
-  EXPECT_THAT(calibration.take_messages(), Each(Not(HasSubstr("cancelled"))));
+  EXPECT_THAT(test::lines_of(calibration), Each(Not(HasSubstr("cancelled"))));
 }
 
 TEST(SelfCalibration, TakesKeyframesWhereItHasNone) {

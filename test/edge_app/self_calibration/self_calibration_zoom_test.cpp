@@ -96,7 +96,7 @@ TEST_F(ZoomingCamera, AReadingThatJittersIsOneZoom) {
   ASSERT_FALSE(first.empty());
   EXPECT_EQ(nodes(first), 0);
   EXPECT_FALSE(first.back().calibration->calibration.has_centre()) << "there is no other zoom";
-  const auto messages = calibration_.take_messages();
+  const auto messages = test::lines_of(calibration_);
   EXPECT_THAT(messages, Contains(HasSubstr("the zoom reading jitters by 0.05")));
   EXPECT_THAT(messages, Not(Contains(HasSubstr("glitch"))));
   const auto second = dwell(200, zoomed(200, 4));
@@ -118,7 +118,7 @@ TEST_F(ZoomingCamera, WhatIsWithdrawnStaysSoThoughItsReadingJitters) {
   const auto second = dwell(200, zoomed(200, 4));
   ASSERT_FALSE(second.empty());
   ASSERT_EQ(nodes(second), 2);
-  static_cast<void>(calibration_.take_messages());
+  static_cast<void>(test::lines_of(calibration_));
   test::Feed how;
   how.tracker = FrameTracks::Tracker::kOe;
   how.contradicting_from_s = 0;
@@ -130,7 +130,7 @@ TEST_F(ZoomingCamera, WhatIsWithdrawnStaysSoThoughItsReadingJitters) {
   const auto published = test::feed(&calibration_, zoomed(200, 5), how);
   ASSERT_FALSE(published.empty());
   EXPECT_FALSE(published[0].calibration->calibrated);
-  const auto messages = calibration_.take_messages();
+  const auto messages = test::lines_of(calibration_);
   EXPECT_THAT(messages, Contains(HasSubstr("is withdrawn")));
   EXPECT_THAT(messages, Not(Contains(HasSubstr("the calibration zoom curve holds"))));
 }
@@ -142,7 +142,7 @@ TEST_F(ZoomingCamera, HasACurveFromTheSecondZoomOn) {
   const PublishedCalibration& published = *second.back().calibration;
   EXPECT_EQ(published.calibration.zoom, 200);
   ASSERT_EQ(nodes(second), 2);
-  EXPECT_THAT(calibration_.take_messages(),
+  EXPECT_THAT(test::lines_of(calibration_),
               Contains(HasSubstr("zoom curve: 2 nodes from reading 0 to 200")));
   for (int i = 0; i < 2; ++i) {
     const Calibration node = published.zoom_curve.node(i);
@@ -172,12 +172,12 @@ TEST_F(ZoomingCamera, AReadingBetweenBecomesANode) {
   ASSERT_FALSE(dwell(0, zoomed(0)).empty());
   const auto second = dwell(200, zoomed(200, 4));
   ASSERT_FALSE(second.empty());
-  static_cast<void>(calibration_.take_messages());
+  static_cast<void>(test::lines_of(calibration_));
   Calibration before;
   ASSERT_TRUE(second.back().calibration->zoom_curve.at(120, &before));
   const auto third = dwell(120, zoomed(120, 5));
   ASSERT_FALSE(third.empty());
-  EXPECT_THAT(calibration_.take_messages(),
+  EXPECT_THAT(test::lines_of(calibration_),
               AllOf(Contains(HasSubstr("zoom 120: by the zoom curve the focal length is known to")),
                     Contains(HasSubstr("zoom curve: 3 nodes from reading 0 to 200"))));
   EXPECT_EQ(nodes(third), 3);
@@ -187,6 +187,35 @@ TEST_F(ZoomingCamera, AReadingBetweenBecomesANode) {
             4 * parameter_sigma(before, Parameter::kFocalLength) / before.camera.focal_length);
   EXPECT_LT(parameter_sigma(made, Parameter::kFocalLength),
             0.1 * parameter_sigma(before, Parameter::kFocalLength));
+}
+
+// As while the zoom moves: its lens is known, so that nothing is lacking.
+TEST_F(ZoomingCamera, OnTheCurveNoCalibrationIsLacking) {
+  ASSERT_FALSE(dwell(0, zoomed(0)).empty());
+  ASSERT_FALSE(dwell(200, zoomed(200, 4)).empty());
+  const auto last = dwell(100, zoomed(100, 5));
+  ASSERT_FALSE(last.empty());
+  const auto f_sigma = [&](double reading) {
+    Calibration c;
+    EXPECT_TRUE(last.back().calibration->zoom_curve.at(reading, &c));
+    return relative_focal_length_sigma(c);
+  };
+  const auto pass = [this](double from, double to) {
+    for (int i = 0; i <= 10; ++i) {
+      PanTiltSample sample;
+      sample.earliest_time_s = sample.latest_time_s = from_s_ += 0.05;
+      sample.zoom = from + (to - from) * i / 10;
+      calibration_.add(sample);
+    }
+  };
+  pass(101, 105);
+  ASSERT_LT(f_sigma(105), 0.01);
+  EXPECT_EQ(calibration_.report().activity, CalibrationActivity::kWatching);
+  EXPECT_FALSE(calibration_.progress());
+  pass(110, 380);
+  ASSERT_GT(f_sigma(380), 0.01);
+  EXPECT_EQ(calibration_.report().activity, CalibrationActivity::kCollecting);
+  EXPECT_TRUE(calibration_.progress());
 }
 
 // The lens comes back to about where it was.
@@ -206,7 +235,7 @@ TEST_F(ZoomingCamera, AVisitOfANodeIsAnotherOne) {
       4 * kRepeatability);
   EXPECT_EQ(nodes(back), 3);
   test::expect_truth(again, back.back().calibration->calibration);
-  EXPECT_THAT(calibration_.take_messages(), Not(Contains(HasSubstr("is not what"))));
+  EXPECT_THAT(test::lines_of(calibration_), Not(Contains(HasSubstr("is not what"))));
   Calibration c;
   ASSERT_TRUE(back.back().calibration->zoom_curve.at(0, &c));
   EXPECT_NEAR(parameter_sigma(c, Parameter::kFocalLength) / c.camera.focal_length,
@@ -241,7 +270,7 @@ TEST_F(ZoomingCamera, TheClockOffsetOfAnotherConnectionContradictsNoNode) {
 TEST_F(ZoomingCamera, AnotherCameraBeginsANewCurveAfterTwoContradictions) {
   ASSERT_FALSE(dwell(0, zoomed(0)).empty());
   ASSERT_FALSE(dwell(200, zoomed(200, 4)).empty());
-  static_cast<void>(calibration_.take_messages());
+  static_cast<void>(test::lines_of(calibration_));
   const auto other = [](double reading, std::uint64_t seed) {
     test::Simulation s = zoomed(reading, seed);
     s.focal_length *= 1.3;
@@ -250,7 +279,7 @@ TEST_F(ZoomingCamera, AnotherCameraBeginsANewCurveAfterTwoContradictions) {
   };
   const auto first = dwell(100, other(100, 7), 30);
   ASSERT_FALSE(first.empty());
-  EXPECT_THAT(calibration_.take_messages(),
+  EXPECT_THAT(test::warnings_of(calibration_),
               AllOf(Contains(AllOf(HasSubstr("zoom 100: not of the zoom curve"),
                                    HasSubstr("does not share line delay"))),
                     Contains(HasSubstr("a new curve begins at zoom 100"))));
@@ -265,14 +294,14 @@ TEST_F(ZoomingCamera, AnotherCameraBeginsANewCurveAfterTwoContradictions) {
 TEST_F(ZoomingCamera, NoZoomOfAWithdrawnCurveIsUsedUntilACalibrationAgrees) {
   ASSERT_FALSE(dwell(0, zoomed(0)).empty());
   ASSERT_FALSE(dwell(200, zoomed(200, 4)).empty());
-  static_cast<void>(calibration_.take_messages());
+  static_cast<void>(test::lines_of(calibration_));
   contradicting_ = true;
   const auto withdrawn = dwell(200, zoomed(200, 5), 4);
   contradicting_ = false;
   ASSERT_FALSE(withdrawn.empty());
   EXPECT_FALSE(withdrawn.back().calibration->calibrated);
   EXPECT_TRUE(withdrawn.back().calibration->zoom_curve.empty());
-  EXPECT_THAT(calibration_.take_messages(), Contains(HasSubstr("is withdrawn")));
+  EXPECT_THAT(test::lines_of(calibration_), Contains(HasSubstr("is withdrawn")));
   for (const double reading : {0.0, 200.0, 100.0}) {
     EXPECT_THAT(dwell(reading, zoomed(reading), 1), IsEmpty()) << reading;
   }
@@ -286,13 +315,13 @@ TEST_F(ZoomingCamera, NoZoomOfAWithdrawnCurveIsUsedUntilACalibrationAgrees) {
 TEST_F(ZoomingCamera, AReadingThatIsOfNoCurveKeepsTheCurve) {
   ASSERT_FALSE(dwell(0, zoomed(0)).empty());
   ASSERT_FALSE(dwell(200, zoomed(200, 4)).empty());
-  static_cast<void>(calibration_.take_messages());
+  static_cast<void>(test::lines_of(calibration_));
   const auto odd = dwell(1000, zoomed(100, 5));
   ASSERT_FALSE(odd.empty());
   EXPECT_TRUE(odd.back().calibration->calibrated) << "it holds where it was made";
   EXPECT_EQ(nodes(odd), 2);
   test::expect_truth(zoomed(100), odd.back().calibration->calibration);
-  EXPECT_THAT(calibration_.take_messages(),
+  EXPECT_THAT(test::lines_of(calibration_),
               Contains(AllOf(HasSubstr("zoom 1000: not of the zoom curve"),
                              HasSubstr("the focal length goes back"))));
 }
@@ -317,7 +346,7 @@ TEST_P(ZoomReadings, ThatAreNoneCostNothingAndAreSaid) {
   EXPECT_EQ(published.back().calibration->calibration.zoom, 0);
   EXPECT_FALSE(published.back().calibration->calibration.has_centre()) << "no second zoom";
   test::expect_truth(s, published.back().calibration->calibration);
-  EXPECT_THAT(calibration.take_messages(), Contains(HasSubstr(GetParam().said)));
+  EXPECT_THAT(test::lines_of(calibration), Contains(HasSubstr(GetParam().said)));
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -339,9 +368,9 @@ INSTANTIATE_TEST_SUITE_P(
 TEST_F(ZoomingCamera, AFrozenReadingIsSaid) {
   ASSERT_FALSE(dwell(0, zoomed(0)).empty());
   ASSERT_FALSE(dwell(200, zoomed(200, 4)).empty());
-  static_cast<void>(calibration_.take_messages());
+  static_cast<void>(test::lines_of(calibration_));
   ASSERT_FALSE(dwell(0, zoomed(30, 5), 30).empty());
-  EXPECT_THAT(calibration_.take_messages(),
+  EXPECT_THAT(test::lines_of(calibration_),
               AllOf(Contains(HasSubstr("is not what the calibration says")),
                     Contains(HasSubstr("its reading does not follow the lens"))));
 }
@@ -362,9 +391,9 @@ TEST_F(ZoomingCamera, FramesFromBeforeAMovementAreNotOfTheReadingAfterIt) {
 TEST_F(ZoomingCamera, AReadingThatWrapsIsSaid) {
   ASSERT_FALSE(dwell(10, zoomed(10)).empty());
   ASSERT_FALSE(dwell(200, zoomed(200, 4)).empty());
-  static_cast<void>(calibration_.take_messages());
+  static_cast<void>(test::lines_of(calibration_));
   ASSERT_FALSE(dwell(10, zoomed(210, 5), 30).empty());
-  EXPECT_THAT(calibration_.take_messages(),
+  EXPECT_THAT(test::lines_of(calibration_),
               Contains(HasSubstr("is not what the calibration says")));
 }
 
@@ -382,13 +411,13 @@ TEST_F(ZoomingCamera, WhatIsNotSeenCostsNoNode) {
   ASSERT_FALSE(hunted.empty());
   EXPECT_EQ(nodes(hunted), 2);
   test::expect_truth(s, hunted.back().calibration->calibration);
-  static_cast<void>(calibration_.take_messages());
+  static_cast<void>(test::lines_of(calibration_));
   how.zoom = 700;
   how.from_s += 20;
   how.first_frame += 1000;
   how.blurred = [](double) { return true; };
   EXPECT_THAT(test::feed(&calibration_, zoomed(700, 5), how), IsEmpty());
-  EXPECT_THAT(calibration_.take_messages(), Contains(HasSubstr("not calibrated yet")));
+  EXPECT_THAT(test::lines_of(calibration_), Contains(HasSubstr("not calibrated yet")));
   EXPECT_STREQ(to_string(calibration_.report().need), to_string(CalibrationNeed::kTexture));
   from_s_ = how.from_s + 20;
   first_frame_ = how.first_frame + 1000;
@@ -443,12 +472,12 @@ TEST_F(StoredZooms, AreThereInTheNextRun) {
 TEST_F(StoredZooms, OfAnotherCameraAreKeptUnderOtherNames) {
   ASSERT_FALSE(dwell(0, zoomed(0)).empty());
   ASSERT_FALSE(dwell(200, zoomed(200, 4)).empty());
-  static_cast<void>(calibration_.take_messages());
+  static_cast<void>(test::lines_of(calibration_));
   test::Simulation other = zoomed(100, 7);
   other.focal_length *= 1.3;
   other.line_delay *= 8;
   ASSERT_FALSE(dwell(100, other, 30).empty());
-  EXPECT_THAT(calibration_.take_messages(),
+  EXPECT_THAT(test::lines_of(calibration_),
               Contains(AllOf(HasSubstr("a new curve begins"),
                              HasSubstr("set aside as calibration.yaml.replaced"))));
   EXPECT_THAT(

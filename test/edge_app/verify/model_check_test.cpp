@@ -2,14 +2,19 @@
 
 #include "edge_app/verify/model_check.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <vector>
 
 #include "test/edge_app/verify/seen_places.h"
 
 namespace alidade {
 namespace {
+
+using ::testing::AllOf;
+using ::testing::Contains;
 
 constexpr double kLimit = 4e-4;
 
@@ -58,6 +63,18 @@ TEST(ModelCheck, FindsNothingMoreOftenThanChanceHasItInAModelThatHolds) {
   EXPECT_LT(found, 3);
 }
 
+// As compressed pictures have them: neither a departure nor noise of telemetry.
+TEST(ModelCheck, TakesErrorsThatThePlacesOfAPairShareForThePictures) {
+  constexpr int kRuns = 20;
+  test::PlaceErrors errors;
+  errors.shared_px = 0.1;
+  int found = 0;
+  for (int run = 0; run < kRuns; ++run)
+    found += static_cast<int>(check(static_cast<std::uint64_t>(run + 1), errors).found.size());
+  // 1 % of the runs; two of 20 have a chance of 1.7 %.
+  EXPECT_LT(found, 2);
+}
+
 TEST(ModelCheck, NamesAWrongFocalLength) {
   const DepartureTest test = only_cause(off(Parameter::kFocalLength, 8), Departure::kFocalLength);
   ASSERT_EQ(test.size.size(), 1U);
@@ -82,7 +99,7 @@ TEST(ModelCheck, NamesAGear) {
   errors.pan_gear_rad = 3e-4;
   const DepartureTest test = only_cause(errors, Departure::kPanGear);
   ASSERT_EQ(test.at.size(), test.size.size());
-  // Knots give a sine of 8 knots a period to a fifth; what all have in common means nothing.
+  // Knots give a sine of four knots a period to a fifth; what all have in common means nothing.
   double mean = 0;
   for (const double size : test.size) mean += size / static_cast<double>(test.size.size());
   double largest = 0;
@@ -97,6 +114,37 @@ TEST(ModelCheck, NamesPlay) {
   const DepartureTest test = only_cause(errors, Departure::kTiltPlay);
   ASSERT_EQ(test.size.size(), 1U);
   EXPECT_NEAR(test.size[0], 3e-4, 4 * test.sigma[0]);
+}
+
+// With what is stated, either would be a gear or an axis: its errors are as large as theirs.
+TEST(ModelCheck, NamesJitterOfTelemetrysTimes) {
+  test::PlaceErrors errors;
+  errors.time_jitter_s = 5e-3;
+  const DepartureTest test = only_cause(errors, Departure::kTimeJitter);
+  ASSERT_EQ(test.size.size(), 1U);
+  // Of an RMS over 48 frames.
+  EXPECT_NEAR(test.sigma[0], 5e-3 / std::sqrt(2 * 48.0), 2.5e-4);
+  EXPECT_NEAR(test.size[0], 5e-3, 4 * 5e-3 / std::sqrt(2 * 48.0));
+  EXPECT_EQ(check(7, errors).found.size(), 1U);
+}
+
+TEST(ModelCheck, NamesNoiseOfTelemetrysAngles) {
+  test::PlaceErrors errors;
+  errors.angle_noise_rad = 3e-4;
+  const DepartureTest test = only_cause(errors, Departure::kAngleNoise);
+  ASSERT_EQ(test.size.size(), 1U);
+  EXPECT_NEAR(test.size[0], 3e-4, 4 * 3e-4 / std::sqrt(4 * 48.0));
+  EXPECT_EQ(check(7, errors).found.size(), 1U);
+}
+
+TEST(ModelCheck, FindsAGearBesideJitter) {
+  test::PlaceErrors errors;
+  errors.time_jitter_s = 2e-3;
+  errors.pan_gear_rad = 3e-4;
+  std::vector<Departure> found;
+  for (const DepartureTest& test : check(7, errors).found) found.push_back(test.departure);
+  // Four knots a period leave some of the gear, which looks like noise.
+  EXPECT_THAT(found, AllOf(Contains(Departure::kPanGear), Contains(Departure::kTimeJitter)));
 }
 
 TEST(ModelCheck, SaysNothingWithoutPairs) {

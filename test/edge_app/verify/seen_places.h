@@ -23,9 +23,12 @@ struct PlaceErrors {
   Eigen::Matrix<double, kParameterCount, 1> parameters =
       Eigen::Matrix<double, kParameterCount,
                     1>::Zero();  // truth minus calibration, and what is drawn
-  double pan_gear_rad = 0;   // telemetry minus truth: times the sine of 3 periods over the range
-  double tilt_play_rad = 0;  // b of an encoder on the motor
-  double growth = 1;         // of the frames' errors against their covariance
+  double pan_gear_rad = 0;     // telemetry minus truth: times the sine of 3 periods over the range
+  double tilt_play_rad = 0;    // b of an encoder on the motor
+  double time_jitter_s = 0;    // RMS, of the telemetry's time at each frame
+  double angle_noise_rad = 0;  // RMS, of each angle, beyond what is claimed
+  double shared_px = 0;  // RMS of an error that all places of a pair share, of each coordinate
+  double growth = 1;     // of the frames' errors against their covariance
   // Each other frame is taken at 1.2 times f, whose calibration has errors of its own, larger ones.
   bool two_zooms = false;
 };
@@ -120,6 +123,15 @@ inline SeenPlaces see_places(std::uint64_t seed, const PlaceErrors& errors) {
     seen.rate.tilt -= by_parameters[3] + errors.growth * kRate_rad_s * normal(generator);
     seen.angle.pan += errors.pan_gear_rad * std::sin(3 * kPi * is.angle.pan / kReach_rad);
     seen.angle.tilt += errors.tilt_play_rad / 2 * frame.heading.tilt;
+    if (errors.time_jitter_s > 0) {
+      const double late = errors.time_jitter_s * normal(generator);
+      seen.angle.pan += late * is.rate.pan;
+      seen.angle.tilt += late * is.rate.tilt;
+    }
+    if (errors.angle_noise_rad > 0) {
+      seen.angle.pan += errors.angle_noise_rad * normal(generator);
+      seen.angle.tilt += errors.angle_noise_rad * normal(generator);
+    }
     frame.by_telemetry = seen;
     out.frames.push_back(frame);
   }
@@ -129,6 +141,9 @@ inline SeenPlaces see_places(std::uint64_t seed, const PlaceErrors& errors) {
     int partners = 0;
     for (std::size_t j = i + 4; j < true_frames.size() && partners < 4; j += 3) {
       PlacePair pair{i, j, {}};
+      Vector2<double> shared = Vector2<double>::Zero();
+      if (errors.shared_px > 0)
+        shared = errors.shared_px * Vector2<double>(normal(generator), normal(generator));
       for (int attempt = 0; attempt < 4 * kPlaces; ++attempt) {
         PlaceMatch place;
         place.first = {u(generator), v(generator)};
@@ -140,6 +155,7 @@ inline SeenPlaces see_places(std::uint64_t seed, const PlaceErrors& errors) {
             place.second.y() > 360) {
           continue;
         }
+        place.second += shared;
         place.second += kPicture_px * Vector2<double>(normal(generator), normal(generator));
         if (pair.places.size() < kPlaces) pair.places.push_back(place);
       }
