@@ -19,6 +19,7 @@ std::vector<ImageMotion> image_motion(const AdjustmentData& data, double baselin
     seen[static_cast<std::size_t>(o.frame)].push_back({o.landmark, o.u});
   }
   constexpr std::size_t kMinShared = 3;
+  constexpr double kLongestBaselines = 2;  // beyond, tracking was lost in between
   std::vector<Vector2<double>> position(frames, Vector2<double>::Zero());
   std::vector<int> chain(frames, 0);
   std::vector<double> du;
@@ -45,9 +46,15 @@ std::vector<ImageMotion> image_motion(const AdjustmentData& data, double baselin
   std::vector<ImageMotion> motion;
   std::size_t to = 0;
   for (std::size_t from = 0; from < frames; ++from) {
-    while (to < frames && data.frame_time_s[to] < data.frame_time_s[from] + baseline_s) ++to;
+    if (seen[from].empty()) continue;
+    // Frames without observations lie between: only every second one may be used.
+    const auto is_too_early = [&](std::size_t frame) {
+      return seen[frame].empty() || data.frame_time_s[frame] < data.frame_time_s[from] + baseline_s;
+    };
+    while (to < frames && is_too_early(to)) ++to;
     if (to == frames) break;
-    if (seen[from].empty() || seen[to].empty() || chain[from] != chain[to]) continue;
+    if (chain[from] != chain[to]) continue;
+    if (data.frame_time_s[to] > data.frame_time_s[from] + kLongestBaselines * baseline_s) continue;
     motion.push_back(
         {data.frame_time_s[from], data.frame_time_s[to], position[to] - position[from]});
   }

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -50,6 +51,21 @@ TEST(MotionMatch, FindsClockOffsetAndFocalLengthWithoutAGuess) {
   EXPECT_GT(match.correlation, 0.999);
   EXPECT_NEAR(match.shift_s, kShift, 2e-3);
   // cos(tilt) of 0.1 rad at most: half a percent.
+  EXPECT_NEAR(match.focal_length, kFocalLength, 0.01 * kFocalLength);
+}
+
+// As in a long recording, of which every third frame is used; a step of 0.5 s ends at another one.
+TEST(MotionMatch, FramesWithoutObservationsMayLieBetween) {
+  AdjustmentData data = tracks();
+  auto& seen = data.observations;
+  seen.erase(std::remove_if(seen.begin(), seen.end(),
+                            [](const AdjustmentObservation& o) { return o.frame % 3 != 0; }),
+             seen.end());
+  const auto motion = image_motion(data, 0.5);
+  ASSERT_GT(motion.size(), 40u);
+  for (const ImageMotion& m : motion) EXPECT_NEAR(m.to_s - m.from_s, 0.6, 1e-9);
+  const MotionMatch match = match_motion(motion, telemetry(), 0, 1);
+  EXPECT_NEAR(match.shift_s, kShift, 2e-3);
   EXPECT_NEAR(match.focal_length, kFocalLength, 0.01 * kFocalLength);
 }
 
