@@ -38,6 +38,7 @@ struct CalibrationNotes {
 //   focal_length: {value: 32008, sigma: 24}         and likewise every parameter
 //   pan_axis: {value: [0, 0, 1], sigma: [0, 0]}     unit vector; sigma in rad, in tangent_basis
 //   centre_offset: {value: [0, 0], sigma: [0, 0]}   optional: px, optical centre - image's middle
+//   centre_error: {sigma: [0.02, 0.03], correlation: 0}   optional: Calibration::centre_error, px
 //   zoom: 1234                                      optional; needed with zoom_curve
 //   covariance: {names: [...], matrix: [[...]]}     optional; must agree with the sigmas to 0.1 %
 //   zoom_curve: {...}                               optional: other readings, zoom_text.h

@@ -5,8 +5,10 @@
 // and tilt. The centre becomes exact, and what its error does to the other parameters becomes part
 // of their covariance:
 //   C' = C_held + (S - G) V (S - G)^T        C_held, S, V: centre_share.h
-// G: an error of c px turns camera frame, base and axes together by c / f, which is no error of any
-// direction. Pure; no allocation. Derivation: docs/calibration.md.
+// G: an error of c px turns camera frame, base and axes together by c / f. On the axis of the
+// picture this is no error of any direction. x off the axis, x the tangent of the angle, it is one
+// of c x^2 px at most, which Calibration::centre_error keeps. Pure; no allocation. Derivation:
+// docs/calibration.md.
 
 #include "core/calibration/axes_turn.h"
 #include "core/calibration/centre_share.h"
@@ -70,6 +72,7 @@ namespace internal {
   out.covariance = internal::with_centre_held(
       free.covariance, internal::centre_share<kParameterCount>(free.covariance));
   out.covariance += internal::share_in_frame(free).part();
+  out.centre_error = internal::centre_share<kParameterCount>(free.covariance).covariance;
   return out;
 }
 
@@ -85,7 +88,17 @@ namespace internal {
   share.slope = internal::axes_turn(free.mechanics, exact.mechanics) * share.slope;
   Calibration out = exact;
   out.covariance += share.part();
+  out.centre_error = share.covariance;
   return out;
+}
+
+// The covariance of a calibration with the error of its centre as one of the centre, and of the
+// axes that turn with it: C' + (E + G) V (E + G)^T, E the centre's rows, V centre_error. With a
+// free centre's C_held + S V S^T it shares all but the covariance of (S - G) c and (E + G) c.
+[[nodiscard]] inline ParameterCovariance<double> covariance_with_centre(const Calibration& c) {
+  Matrix<double, kParameterCount, 2> by_centre = axes_by_centre(c);
+  by_centre.middleRows<2>(index(Parameter::kCentreU)).setIdentity();
+  return c.covariance + by_centre * c.centre_error * by_centre.transpose();
 }
 
 }  // namespace alidade

@@ -89,10 +89,12 @@ void EstimateReader::read_image(int* width, int* height) const {
   *height = pixels(image, "height");
 }
 
-YAML::Node EstimateReader::entry(const std::string& name) const {
+YAML::Node EstimateReader::entry(const std::string& name,
+                                 const std::vector<std::string>& keys) const {
   const YAML::Node entry = required(root_, name.c_str(), "");
-  if (!entry.IsMap()) fail(entry, name + " is not a map; write {value: ..., sigma: ...}");
-  check_keys(entry, {"value", "sigma"}, name + ".");
+  if (!entry.IsMap())
+    fail(entry, name + " is not a map; write {" + keys[0] + ": ..., " + keys[1] + ": ...}");
+  check_keys(entry, keys, name + ".");
   return entry;
 }
 

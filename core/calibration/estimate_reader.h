@@ -56,7 +56,9 @@ class EstimateReader {
   // px; whole numbers from 1 to 100000.
   void read_image(int* width, int* height) const;
   // The map {value, sigma} of this name.
-  [[nodiscard]] YAML::Node entry(const std::string& name) const;
+  // keys: those that it may have.
+  [[nodiscard]] YAML::Node entry(const std::string& name,
+                                 const std::vector<std::string>& keys = {"value", "sigma"}) const;
   // The value of an entry, checked against the range.
   [[nodiscard]] double value(const YAML::Node& entry, const std::string& name,
                              const EstimateRange& range) const;

@@ -146,6 +146,14 @@ std::string format_calibration(const Calibration& calibration, const Calibration
         << YAML::EndSeq << YAML::EndMap
         << YAML::Comment("px, of the optical centre from the image's middle");
   }
+  if (!calibration.centre_error.isZero(0)) {
+    const Vector2<double> own = calibration.centre_error.diagonal().cwiseSqrt();
+    out << YAML::Key << "centre_error" << YAML::Value << YAML::Flow << YAML::BeginMap << YAML::Key
+        << "sigma" << YAML::Value << YAML::BeginSeq << exact_text(own.x()) << exact_text(own.y())
+        << YAML::EndSeq << YAML::Key << "correlation" << YAML::Value
+        << exact_text(calibration.centre_error(0, 1) / (own.x() * own.y())) << YAML::EndMap
+        << YAML::Comment("px, of the optical centre, which is exact only as the frame's axis");
+  }
   write_scalar(Parameter::kLineDelay, calibration.line_delay, "s/row");
   write_axis("pan_axis", calibration.mechanics.pan_axis, Parameter::kPanAxis0,
              "unit vector in the base: forward, right, down; sigma in rad");

@@ -69,11 +69,11 @@ class CalibrationReader {
   Calibration read() {
     file_.check_top(
         "a calibration",
-        {"format",        "image",        "focal_length",     "aspect",        "radial_distortion",
-         "centre_offset", "zoom_curve",   "line_delay",       "pan_axis",      "tilt_axis",
-         "pan_scale",     "tilt_scale",   "clock_offset",     "zoom",          "pan_error",
-         "tilt_error",    "pan_play_rad", "tilt_play_rad",    "covariance",    "quality",
-         "landmarks",     "pupil_m",      "far_focal_length", "holds_beyond_m"});
+        {"format",        "image",        "focal_length",     "aspect",         "radial_distortion",
+         "centre_offset", "zoom_curve",   "line_delay",       "pan_axis",       "tilt_axis",
+         "pan_scale",     "tilt_scale",   "clock_offset",     "zoom",           "pan_error",
+         "tilt_error",    "pan_play_rad", "tilt_play_rad",    "covariance",     "quality",
+         "landmarks",     "pupil_m",      "far_focal_length", "holds_beyond_m", "centre_error"});
     const YAML::Node& root = file_.root();
     file_.read_image(&calibration_.camera.width, &calibration_.camera.height);
 
@@ -86,6 +86,7 @@ class CalibrationReader {
     if (root["aspect"]) calibration_.camera.aspect = scalar(Parameter::kAspect);
     calibration_.camera.distortion.only_term() = scalar(Parameter::kRadialDistortion);
     if (root["centre_offset"]) calibration_.camera.set_centre_offset(centre_offset());
+    if (root["centre_error"]) calibration_.centre_error = centre_error();
     calibration_.line_delay = scalar(Parameter::kLineDelay);
     calibration_.mechanics.pan_axis =
         axis("pan_axis", calibration_.mechanics.pan_axis, Parameter::kPanAxis0);
@@ -108,6 +109,11 @@ class CalibrationReader {
       file_.fail(root["landmarks"], "landmarks is not a file name; write `landmarks: map.bin`");
     }
     if (root["covariance"]) covariance(root["covariance"]);
+    if (root["centre_error"] &&
+        calibration_.covariance.diagonal().segment<2>(index(Parameter::kCentreU)).maxCoeff() > 0) {
+      file_.fail(root["centre_error"],
+                 "centre_error is of a centre whose sigma is 0; leave one of both out");
+    }
     if (root["zoom_curve"]) {
       if (!calibration_.zoom) {
         file_.fail(root["zoom_curve"], "zoom is missing; add the reading of focal_length");
@@ -196,6 +202,31 @@ class CalibrationReader {
     }
     set_pair_of_sigmas(entry, name, Parameter::kCentreU);
     return {values[0], values[1]};
+  }
+
+  Matrix2<double> centre_error() {
+    const std::string name = "centre_error";
+    const YAML::Node entry = file_.entry(name, {"sigma", "correlation"});
+    const YAML::Node node = file_.required(entry, "sigma", name + ".");
+    const std::vector<double> sigma = file_.numbers(node, name + ".sigma", 2);
+    for (const double each : sigma) {
+      if (!(each > 0) || each > largest_sigma(Parameter::kCentreU)) {
+        file_.fail(node, name + ".sigma has " + short_text(each) +
+                             "; give px, more than 0, one standard deviation");
+      }
+    }
+    const bool is_correlated = entry["correlation"].IsDefined();
+    const double correlation =
+        is_correlated ? file_.number(entry["correlation"], name + ".correlation") : 0;
+    if (!(std::abs(correlation) < 1)) {
+      file_.fail(entry["correlation"], name + ".correlation is " + short_text(correlation) +
+                                           "; give more than -1 and less than 1");
+    }
+    const Vector2<double> own(sigma[0], sigma[1]);
+    Matrix2<double> out = own * own.transpose();
+    out(0, 1) *= correlation;
+    out(1, 0) *= correlation;
+    return out;
   }
 
   void set_pair_of_sigmas(const YAML::Node& entry, const std::string& name, Parameter first) {

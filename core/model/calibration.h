@@ -98,6 +98,10 @@ struct Calibration {
   // Rows and columns: Parameter, in the parameters' units. A zero row marks a parameter that is
   // taken as exact.
   ParameterCovariance<double> covariance = ParameterCovariance<double>::Zero();
+  // px^2: covariance of the optical centre's estimate where the centre is exact because the camera
+  // frame's axis is defined to go through it (core/calibration/centre_frame.h). `covariance` has
+  // what this error does to the other parameters. 0: there is none, or it is in `covariance`.
+  Matrix2<double> centre_error = Matrix2<double>::Zero();
 
   // False only if the optical centre is exactly the image's middle: offset and variance are 0.
   [[nodiscard]] bool has_centre() const {

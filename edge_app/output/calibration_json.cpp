@@ -31,6 +31,10 @@ ordered_json parameters_json(const Calibration& calibration) {
         {"value", {calibration.camera.centre_u, calibration.camera.centre_v}},
         {"sigma", {sigma(Parameter::kCentreU), sigma(Parameter::kCentreV)}}};
   }
+  if (const Matrix2<double>& V = calibration.centre_error; !V.isZero(0)) {
+    parameters["centre_error"] = {{"sigma", {std::sqrt(V(0, 0)), std::sqrt(V(1, 1))}},
+                                  {"correlation", V(0, 1) / std::sqrt(V(0, 0) * V(1, 1))}};
+  }
   scalar(Parameter::kLineDelay);
   axis("pan_axis", calibration.mechanics.pan_axis, Parameter::kPanAxis0);
   axis("tilt_axis", calibration.mechanics.tilt_axis, Parameter::kTiltAxis0);

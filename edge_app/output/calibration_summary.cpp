@@ -74,9 +74,12 @@ std::vector<SummaryRow> summary_rows(const CalibrationResult& result,
   if (c.has_centre()) {
     const CalibrationPrior u{options.centre_offset_px.x(), options.centre_sigma_px};
     const CalibrationPrior v{options.centre_offset_px.y(), options.centre_sigma_px};
+    Calibration with_error = c;
+    with_error.covariance.block<2, 2>(index(Parameter::kCentreU), index(Parameter::kCentreU)) +=
+        c.centre_error;
     rows.insert(rows.begin() + 3,
-                {scalar_row(c, Parameter::kCentreU, c.camera.centre_u, 1, "px", u),
-                 scalar_row(c, Parameter::kCentreV, c.camera.centre_v, 1, "px", v)});
+                {scalar_row(with_error, Parameter::kCentreU, c.camera.centre_u, 1, "px", u),
+                 scalar_row(with_error, Parameter::kCentreV, c.camera.centre_v, 1, "px", v)});
   }
   return rows;
 }

@@ -206,6 +206,8 @@ CheckedCalibration SelfCalibration::adjust(const Calibration* known, bool free_c
       checked.result.calibration = with_centre_error(checked.result.calibration, free);
     }
   }
+  // A refined calibration keeps the frame, and with it the error of the centre.
+  if (known != nullptr) checked.result.calibration.centre_error = known->centre_error;
   checked.result.calibration.zoom = zoom_.reading();
   return checked;
 }

@@ -200,10 +200,32 @@ TEST(CalibrationText, TellsOfTheOpticalCentreWhereItIsNotTheMiddle) {
   expect_same_bits(parsed(without), middle);
 }
 
+TEST(CalibrationText, TellsTheErrorOfACentreThatIsExactByDefinition) {
+  Calibration c = paper_calibration();
+  for (const Parameter p : {Parameter::kCentreU, Parameter::kCentreV}) {
+    c.covariance.row(index(p)).setZero();
+    c.covariance.col(index(p)).setZero();
+  }
+  c.centre_error << 4e-4, -1e-4, -1e-4, 9e-4;
+  const std::string text = format_calibration(c);
+  EXPECT_THAT(text, HasSubstr("centre_error: {sigma: [0.02, 0.03], correlation: -0.166666666"));
+  EXPECT_LT((parsed(text).centre_error - c.centre_error).norm(), 1e-15);
+  EXPECT_TRUE(parsed(format_calibration(paper_calibration())).centre_error.isZero(0));
+}
+
 TEST(CalibrationText, RefusesACentreThatIsNone) {
   const auto refused = [](const std::string& line) {
     return refusal(std::string(kByHand) + line + "\n");
   };
+  EXPECT_THAT(refused("centre_error: {sigma: [1, 0]}"),
+              HasSubstr("centre_error.sigma has 0; give px"));
+  EXPECT_THAT(refused("centre_error: {sigma: [1, 1], correlation: 1}"),
+              HasSubstr("centre_error.correlation is 1; give more than -1"));
+  EXPECT_THAT(refused("centre_error: {correlation: 0}"),
+              HasSubstr("centre_error.sigma is missing"));
+  EXPECT_THAT(
+      refused("centre_offset: {value: [1, 2], sigma: [1, 1]}\ncentre_error: {sigma: [1, 1]}"),
+      HasSubstr("centre_error is of a centre whose sigma is 0"));
   EXPECT_THAT(refused("centre_offset: {value: [1]}"),
               HasSubstr("centre_offset is not a list of 2 numbers"));
   EXPECT_THAT(refused("centre_offset: {value: [1, 20000]}"),
