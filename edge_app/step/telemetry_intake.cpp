@@ -42,6 +42,7 @@ TelemetryIntake::Taken TelemetryIntake::add(const PanTiltSample& sample) {
     samples_ = empty(filtered);
     filtered_ = filtered;
     measured_count_ = 0;
+    first_.reset();
     correction_.forget_state();
   }
   is_lost_ = false;
@@ -58,6 +59,7 @@ TelemetryIntake::Taken TelemetryIntake::add(const PanTiltSample& sample) {
   } else {
     timed.time_s = sample.latest_time_s - width_s / 2;
     timed.time_sigma_s = width_s > 0 ? width_s / std::sqrt(12.0) : options_.stamp_sigma_s;
+    forget_old_first(timed);
   }
   step_.add(timed.pan, timed.tilt);
   if (resolution_shown() != resolution_) {
@@ -73,6 +75,23 @@ TelemetryIntake::Taken TelemetryIntake::add(const PanTiltSample& sample) {
   correction_.add_left(&here);
   out.error_variance = here.error_variance;
   return out;
+}
+
+// A later angle is new when it differs from the one before. The first may be as old as a device's
+// angle can be that measures seldom, and would give a wrong rate. An angle that stands for longer is
+// that of a head at rest.
+void TelemetryIntake::forget_old_first(const TelemetrySample& next) {
+  if (measured_count_ == 0) {
+    first_ = next;
+    return;
+  }
+  if (!first_ || (next.pan == first_->pan && next.tilt == first_->tilt)) return;
+  if (next.time_s < first_->time_s + options_.limits.max_repeat_s) {
+    samples_ = empty(filtered_);
+    measured_count_ = 0;
+    correction_.forget_state();
+  }
+  first_.reset();
 }
 
 TelemetrySample TelemetryIntake::store(const TelemetrySample& measured) {

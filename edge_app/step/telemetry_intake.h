@@ -73,6 +73,8 @@ class TelemetryIntake {
 
   [[nodiscard]] Samples empty(bool filtered) const;
   [[nodiscard]] bool is_stalled_poll(const PanTiltSample& sample);
+  // Empties the buffer at the first change of the angles, if what came before may be too old.
+  void forget_old_first(const TelemetrySample& next);
   // Corrects a sample, puts it into the buffer, and returns it. The buffer counts the samples that
   // it refuses (a duplicate, a value that is not finite); the records' sigma shows the effect.
   TelemetrySample store(const TelemetrySample& measured);
@@ -89,7 +91,8 @@ class TelemetryIntake {
   AngleStep step_;
   std::array<TelemetrySample, kMeasuredKept> measured_{};  // ring buffer
   std::size_t measured_count_ = 0;                         // since the buffer was emptied
-  bool filtered_ = false;                                  // the times in samples_ come from clock_
+  std::optional<TelemetrySample> first_;  // of polled samples, until the angles change
+  bool filtered_ = false;                 // the times in samples_ come from clock_
   bool is_lost_ = false;
   double usual_poll_s_ = 0.01;  // s, from a poll to its answer
 };

@@ -55,6 +55,43 @@ TEST(TelemetryIntake, BeginsAnewWithItsSource) {
   EXPECT_FALSE(has_result(intake.query(0.2, 0, &at)));
 }
 
+// A device that measures each 50 ms, polled each 25 ms. Its first answer is the one before's.
+class SlowDevice {
+ public:
+  void poll(double time_s, double pan_rad) {
+    PanTiltSample sample = polled_at(time_s - kAnswer_s / 2);
+    sample.pan_rad = pan_rad;
+    static_cast<void>(intake_.add(sample));
+  }
+  [[nodiscard]] QueryStatus ask(double time_s) { return intake_.query(time_s, 0, &at_); }
+  [[nodiscard]] const InterpolatedPanTilt& at() const { return at_; }
+
+ private:
+  TelemetryIntake intake_{TelemetryIntakeOptions{}};
+  InterpolatedPanTilt at_;
+};
+
+TEST(TelemetryIntake, LeavesOutAFirstAngleThatMayBeOld) {
+  constexpr double kRate = 0.5;  // rad/s
+  SlowDevice device;
+  device.poll(0.025, 0);
+  device.poll(0.05, kRate * 0.05);
+  EXPECT_FALSE(has_result(device.ask(0.05))) << "twice the rate";
+  device.poll(0.075, kRate * 0.05);
+  device.poll(0.1, kRate * 0.1);
+  ASSERT_TRUE(has_result(device.ask(0.08)));
+  EXPECT_NEAR(device.at().angle.pan, kRate * 0.08, 1e-3);
+  EXPECT_NEAR(device.at().rate.pan, kRate, 1e-2);
+}
+
+TEST(TelemetryIntake, KeepsAFirstAngleThatStoodForLong) {
+  SlowDevice device;
+  for (int i = 1; i <= 8; ++i) device.poll(0.025 * i, 0.1);
+  device.poll(0.225, 0.101);
+  ASSERT_TRUE(has_result(device.ask(0.1)));
+  EXPECT_NEAR(device.at().angle.pan, 0.1, 1e-4);
+}
+
 TEST(TelemetryIntake, IsLostUntilTheNextSample) {
   TelemetryIntake intake({});
   EXPECT_FALSE(intake.is_lost());
@@ -161,13 +198,13 @@ TEST(TelemetryIntake, DoesNotKnowThePlaysStateAfterALoss) {
     EXPECT_NEAR(at.error_variance[1], 0.25e-10, 1e-12);
     if (how == 0) intake.note_lost();
     const int later = how == 1 ? 100 : 50;
-    for (int i = later; i < later + 2; ++i) {
+    for (int i = later; i < later + 3; ++i) {
       PanTiltSample sample = turned_at(i);
       sample.tilt_rad = 0.5 + 1e-6 * i;
       sample.restarted = how == 2 && i == later;
       static_cast<void>(intake.add(sample));
     }
-    ASSERT_EQ(intake.query(kPoll_s * later + 0.01, 0, &at), QueryStatus::kOk);
+    ASSERT_EQ(intake.query(kPoll_s * (later + 1) + 0.01, 0, &at), QueryStatus::kOk);
     EXPECT_GT(std::sqrt(at.error_variance[1]), 0.9 * 3e-4 / std::sqrt(12)) << how;
   }
 }
