@@ -52,6 +52,13 @@ void require_readings(const std::vector<CalibrationJob>& jobs) {
                     "recordings together; calibrate it alone, or add the column zoom",
                     job.recording));
   }
+  const auto at_other = [&](const CalibrationJob& job) { return *job.zoom != *jobs.front().zoom; };
+  if (std::any_of(jobs.begin(), jobs.end(), at_other)) return;
+  throw CommandError(
+      kExitUsage,
+      fmt::format("all {} stretches of constant zoom are of reading {:g}: recordings are "
+                  "calibrated together to make a zoom curve only; calibrate the longest one alone",
+                  jobs.size(), *jobs.front().zoom));
 }
 
 // Median and largest relative sigma of the focal length at readings between the first and the last,

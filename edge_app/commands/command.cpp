@@ -197,6 +197,8 @@ OrientationStepOptions step_options(const RecordingNoise& noise,
       noise.telemetry_stamp_sigma_s.value_or(options.telemetry_stamp_sigma_s);
   options.telemetry_noise.pan_tilt_sigma =
       noise.pan_tilt_sigma_rad.value_or(options.telemetry_noise.pan_tilt_sigma);
+  options.telemetry_noise.resolution =
+      noise.pan_tilt_quantum_rad.value_or(options.telemetry_noise.resolution);
   options.telemetry_noise.period_sigma_s =
       noise.telemetry_period_sigma_s.value_or(options.telemetry_noise.period_sigma_s);
   return options;

@@ -11,6 +11,8 @@
 #include <algorithm>
 #include <cstdio>
 #include <ctime>
+#include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -30,6 +32,8 @@
 
 namespace alidade {
 namespace {
+
+namespace fs = std::filesystem;
 
 struct VerifiedReplay {
   std::vector<SeenFrame> frames;
@@ -136,6 +140,49 @@ VerifiedReplay replay_both_modes(const VerifyOptions& options, OrientationStepOp
   return out;
 }
 
+// Whether the calibration was made from this recording, or was in use during it.
+bool is_own(const VerifyOptions& options) {
+  if (options.calibration.empty()) return true;
+  const fs::path recording = options.recording;
+  const fs::path folder = fs::path(options.calibration).parent_path();
+  std::error_code ignored;
+  return fs::equivalent(folder, recording, ignored) ||
+         fs::equivalent(folder, recording / "alidade", ignored);
+}
+
+// How late telemetry comes against the pictures in this recording, as `run` would find it: the
+// clock offset is the link's, and a calibration of another recording has that of another connection.
+std::optional<VerifiedLink> find_link(const VerifyOptions& options,
+                                      OrientationStepOptions of_step) {
+  std::string error;
+  std::vector<FrameStamp> stamps;
+  if (!read_frames_csv(options.recording, &stamps, &error)) throw CommandError(kExitUsage, error);
+  of_step.oe = oe_options(of_step.calibration.camera);
+  of_step.other_connection = true;
+  OrientationStep step(of_step);
+  if (begins_fresh(stamps)) step.expect_fresh_frames();
+  RecordedImages images(options.recording);
+  const auto video = open_recorded_frames({options.recording, false, false});
+  StopSignals signals;
+  const std::vector<PanTiltSample> samples = all_samples(options.recording);
+  std::size_t next = 0;
+  std::optional<VerifiedLink> found;
+  while (const std::optional<Frame> frame = next_of<Frame>(*video)) {
+    if (signals.wait(-1, 0) == StopSignals::Event::kSignal) {
+      throw CommandError(kExitUsage, options.recording + ": interrupted; nothing was judged");
+    }
+    const double received_s = frame->stamp.receive_time_s;
+    for (; next < samples.size() && samples[next].latest_time_s <= received_s; ++next)
+      step.add_telemetry(samples[next]);
+    StepEvents events;
+    static_cast<void>(step.add_frame(frame->stamp, view_of(images.of(frame->stamp)), &events));
+    if (events.link_delay && events.link_delay->state == LinkDelayState::kFound)
+      found = VerifiedLink{events.link_delay->delay_s, events.link_delay->sigma_s};
+    step.maintain();
+  }
+  return found;
+}
+
 Verification judge_recording(const VerifyOptions& options) {
   std::string error;
   RecordingInfo info;
@@ -153,6 +200,9 @@ Verification judge_recording(const VerifyOptions& options) {
   OrientationStepOptions of_step = step_options(noise, calibration);
   of_step.zoom_tolerance = options.zoom_tolerance;
   of_step.wait_for_pace = !noise.image_stamp_sigma_s;
+  const std::optional<VerifiedLink> link =
+      is_own(options) ? std::nullopt : find_link(options, of_step);
+  if (link) of_step.link_delay = {LinkDelayState::kFound, link->delay_s, link->sigma_s};
   const VerifiedReplay replay = replay_both_modes(options, of_step);
   return verify({options.recording,
                  calibration.name,
@@ -161,7 +211,8 @@ Verification judge_recording(const VerifyOptions& options) {
                  of_step.telemetry_noise.pan_tilt_sigma,
                  replay.telemetry_s > 0 ? (replay.samples - 1) / replay.telemetry_s : 0,
                  replay.known,
-                 {turn_sigma_of(options.heading_sigma), turn_sigma_of(options.level_sigma)}});
+                 {turn_sigma_of(options.heading_sigma), turn_sigma_of(options.level_sigma)},
+                 link});
 }
 
 int exit_code_of(Verdict verdict) {

@@ -20,6 +20,7 @@ void read_noise(YamlSection& top, RecordingNoise* noise) {
   noise->pan_tilt_sigma_rad = top.number("pan_tilt_sigma_rad", {1e-9, 0.1, "rad"});
   noise->pan_tilt_scale_sigma = top.number("pan_tilt_scale_sigma", {0, 1, "1"});
   noise->pan_tilt_accuracy_rad = top.number("pan_tilt_accuracy_rad", {0, 0.1, "rad"});
+  noise->pan_tilt_quantum_rad = top.number("pan_tilt_quantum_rad", {1e-9, 0.1, "rad"});
   // Accepted but not used: each track has its own sigma.
   static_cast<void>(top.number("pixel_sigma_px", {0, 100, "px"}));
   top.finish();

@@ -14,6 +14,8 @@ namespace alidade {
 struct RecordingNoise : CalibrationNoise {
   std::optional<double> pan_tilt_scale_sigma;   // prior of both scales
   std::optional<double> pan_tilt_accuracy_rad;  // the maker's claim, see CalibrationOptions
+  // Step of the readings, for replays; `calibrate` finds it from them.
+  std::optional<double> pan_tilt_quantum_rad;
 };
 
 // Pure. False with one line in *error. `name` names the file in errors.

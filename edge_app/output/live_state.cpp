@@ -19,7 +19,8 @@ bool same(const PlainCalibration& a, const PlainCalibration& b) {
          a.radial_distortion == b.radial_distortion && a.centre_u == b.centre_u &&
          a.centre_v == b.centre_v && a.line_delay == b.line_delay && a.pan_axis == b.pan_axis &&
          a.tilt_axis == b.tilt_axis && a.pan_scale == b.pan_scale && a.tilt_scale == b.tilt_scale &&
-         a.clock_offset == b.clock_offset && a.zoom == b.zoom && a.covariance == b.covariance;
+         a.clock_offset == b.clock_offset && a.zoom == b.zoom && a.covariance == b.covariance &&
+         a.centre_error == b.centre_error;
 }
 
 }  // namespace

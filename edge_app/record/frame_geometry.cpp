@@ -39,6 +39,7 @@ PlainCalibration pack(const Calibration& calibration) {
   out.clock_offset = calibration.clock_offset;
   out.zoom = calibration.zoom;
   store(calibration.covariance, &out.covariance);
+  store(calibration.centre_error, &out.centre_error);
   return out;
 }
 
@@ -72,6 +73,7 @@ Calibration unpack(const PlainCalibration& calibration) {
   out.clock_offset = calibration.clock_offset;
   out.zoom = calibration.zoom;
   out.covariance = load<kParameterCount, kParameterCount>(calibration.covariance);
+  out.centre_error = load<2, 2>(calibration.centre_error);
   return out;
 }
 

@@ -30,6 +30,7 @@ struct PlainCalibration {
   double clock_offset = 0;
   std::optional<double> zoom;
   std::array<double, kParameterCount * kParameterCount> covariance{};
+  std::array<double, 4> centre_error{};
 };
 
 struct FrameGeometry {

@@ -46,6 +46,8 @@ OrientationStep::OrientationStep(const OrientationStepOptions& options)
   telemetry_.correct_by(options.calibration.mechanics, options.telemetry_error);
   // A stored calibration was made over another connection.
   if (options.other_connection && options.calibrated) link_delay_.open(unseen_delay_sigma_s_);
+  if (options.link_delay)
+    link_delay_.begin_found(options.link_delay->delay_s, options.link_delay->sigma_s);
   const Camera<double>& camera = options.calibration.camera;
   const auto follow_points = [this, &camera] {
     StartUpOptions start_up;

@@ -34,6 +34,13 @@
 
 namespace alidade {
 
+// How late telemetry comes against the images, compared with the calibration that is in use.
+struct LinkDelayReport {
+  LinkDelayState state = LinkDelayState::kCalibrated;
+  double delay_s = 0;  // s, added to the calibration's clock offset
+  double sigma_s = 0;
+};
+
 struct OrientationStepOptions {
   Calibration calibration;
   bool calibrated = false;  // false: data-sheet values; landmarks are then not looked for
@@ -42,6 +49,8 @@ struct OrientationStepOptions {
   bool wait_for_pace = false;
   // The calibration, if calibrated, was made over another connection, whose least delay may differ.
   bool other_connection = false;
+  // Of that other connection, if it is known already.
+  std::optional<LinkDelayReport> link_delay;
   ClockFilterOptions video_clock;
   ClockFilterOptions telemetry_clock;
   // s, one standard deviation of a receive time that is used as the capture time.
@@ -78,13 +87,6 @@ struct OrientationStepOptions {
 [[nodiscard]] OeOptions oe_options(const Camera<double>& camera);
 // Throws std::invalid_argument if an option is not valid; its one line names the option.
 [[nodiscard]] std::unique_ptr<OeMode> make_oe_mode(const OeOptions& options);
-
-// How late telemetry comes against the images, compared with the calibration that is in use.
-struct LinkDelayReport {
-  LinkDelayState state = LinkDelayState::kCalibrated;
-  double delay_s = 0;  // s, added to the calibration's clock offset
-  double sigma_s = 0;
-};
 
 // What a frame brought to light, for the log.
 struct StepEvents {

@@ -204,8 +204,8 @@ std::vector<std::string> advice_for(const VerifyInput& input, const Verification
   };
   if (std::any_of(verification.found.begin(), verification.found.end(), is_clock)) {
     out.emplace_back(
-        "the clock offset is that of the link: was the calibration made over another one? `run` "
-        "finds it anew at each start");
+        "the clock offset is that of the link, which `run` finds anew at each start: did pictures "
+        "or angles come later or earlier for a part of the recording?");
   }
   if (verification.pairs < kReturnsLeast && out.empty())
     out.push_back(fmt::format("record longer, {:g} s or more, over a scene with more texture",
@@ -257,6 +257,7 @@ Verification verify(const VerifyInput& input) {
   out.by_all_samples = pair_rows(frames, pairs, OrientationFrom::kAllSamples);
   out.pairs = static_cast<int>(out.by_telemetry.size());
   out.zooms = judged_zooms(frames);
+  out.link = input.link;
   constexpr int kKinds = static_cast<int>(ReturnKind::kCount);
   const int of_known = input.known.empty() ? 0 : 2;
   out.chance_limit = kFalseAlarms / (2 * kKinds + kDepartureCount + of_known);
@@ -297,6 +298,9 @@ Verification verify(const VerifyInput& input) {
   const bool is_enough = out.pairs >= kReturnsLeast;
   if (is_enough) out.verdict = Verdict::kHolds;
   for (ModelComparison& comparison : out.model) {
+    // What is blunt by itself may be sharp once the other causes are allowed for.
+    if (test_of(out.found, comparison.test.departure) != nullptr)
+      comparison.verdict = Verdict::kContradicted;
     if (!is_enough) comparison.verdict = Verdict::kNotJudged;
     comparison.sentence = sentence_of(comparison, out.found);
     if (comparison.verdict == Verdict::kContradicted) out.verdict = Verdict::kContradicted;

@@ -64,15 +64,21 @@ struct KnownComparison {
   std::string sentence;  // the verdict in words
 };
 
+// How much later telemetry comes against the pictures than the calibration has it.
+struct VerifiedLink {
+  double delay_s = 0, sigma_s = 0;
+};
+
 struct VerifyInput {
-  std::string recording;                 // its name
-  std::string calibration;               // its name
-  const std::vector<SeenFrame>& frames;  // by time; borrowed for the call of verify()
-  TelemetryError telemetry_error;        // of the calibration
-  double telemetry_sigma_rad = 0;        // white noise of a sample, as was assumed; 0: not known
-  double telemetry_rate_hz = 0;          // samples per second
-  std::vector<KnownSight> known = {};    // empty: nothing is known from outside
-  TurnSigma turn_sigma = {};             // of the platform against the known directions' axes
+  std::string recording;                  // its name
+  std::string calibration;                // its name
+  const std::vector<SeenFrame>& frames;   // by time; borrowed for the call of verify()
+  TelemetryError telemetry_error;         // of the calibration
+  double telemetry_sigma_rad = 0;         // white noise of a sample, as was assumed; 0: not known
+  double telemetry_rate_hz = 0;           // samples per second
+  std::vector<KnownSight> known = {};     // empty: nothing is known from outside
+  TurnSigma turn_sigma = {};              // of the platform against the known directions' axes
+  std::optional<VerifiedLink> link = {};  // frames have it already; empty: the calibration's own
 };
 
 // Focal lengths of a recording that zooms, px.
@@ -90,6 +96,7 @@ struct Verification {
   int places = 0;                       // see ModelCheckResult
   double noise_ratio = 1;               // see ModelCheckResult
   std::optional<JudgedZooms> zooms;     // empty: one zoom
+  std::optional<VerifiedLink> link;     // see VerifyInput
   double chance_limit = 0;              // a comparison less probable than this contradicts; 0 to 1
   std::vector<ClaimComparison> claims;  // each kind for landmarks, then for telemetry; may be empty
   std::vector<ModelComparison> model;   // each departure; empty as claims: there are no pairs

@@ -113,6 +113,8 @@ std::string verification_json(const Verification& verification,
   json["places"] = verification.places;
   json["picture_noise_ratio"] = verification.noise_ratio;
   json["chance_limit"] = verification.chance_limit;
+  if (const auto& link = verification.link)
+    json["link"] = {{"delay_s", link->delay_s}, {"sigma_s", link->sigma_s}};
   if (const auto& zooms = verification.zooms) {
     json["zooms"] = {{"least_px", zooms->least_px},
                      {"most_px", zooms->most_px},

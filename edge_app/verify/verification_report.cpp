@@ -264,6 +264,7 @@ std::string verification_report(const Verification& v, const VerificationOrigin&
       "</li>\n<li><b>{:.2f}</b>picture noise / stated noise</li>\n</ul>\n",
       v.pairs, v.places, v.noise_ratio);
   if (v.zooms) body += "<p>" + escape_html(sentence_of(*v.zooms)) + "</p>\n";
+  if (v.link) body += "<p>" + escape_html(sentence_of(*v.link)) + "</p>\n";
   body += html_list("What would help", v.advice) + known_part(v);
   if (v.pairs > 0) {
     body += claims_table(v) + ratio_plot(v) + model_table(v) + curves(v);

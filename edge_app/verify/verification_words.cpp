@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 #include "core/model/angle.h"
@@ -23,12 +24,15 @@ double largest_sigmas(const DepartureTest& test) {
 // The sizes at those knots of a curve that are known to within some times the best one; not empty.
 std::vector<double> well_known(const DepartureTest& test) {
   constexpr double kWorse = 30;
-  const double best = *std::min_element(test.sigma.begin(), test.sigma.end());
+  double best = std::numeric_limits<double>::infinity();
+  for (const double sigma : test.sigma) {
+    if (sigma > 0) best = std::min(best, sigma);
+  }
   std::vector<double> out;
   for (std::size_t i = 0; i < test.size.size(); ++i) {
-    if (test.sigma[i] <= kWorse * best) out.push_back(test.size[i]);
+    if (test.sigma[i] > 0 && test.sigma[i] <= kWorse * best) out.push_back(test.size[i]);
   }
-  return out.empty() ? test.size : out;
+  return out.size() < 2 ? test.size : out;
 }
 
 // The comparison with what is known from outside that decides; null: none.
@@ -77,12 +81,6 @@ const ClaimComparison* worst_claim(const Verification& verification) {
   return worst;
 }
 
-bool is_among(const std::vector<DepartureTest>& found, Departure departure) {
-  return std::any_of(found.begin(), found.end(), [departure](const DepartureTest& test) {
-    return test.departure == departure;
-  });
-}
-
 std::string names_of(const std::vector<DepartureTest>& found) {
   std::string out;
   for (const DepartureTest& test : found) {
@@ -93,6 +91,13 @@ std::string names_of(const std::vector<DepartureTest>& found) {
 }
 
 }  // namespace
+
+const DepartureTest* test_of(const std::vector<DepartureTest>& found, Departure departure) {
+  const auto at = std::find_if(found.begin(), found.end(), [departure](const DepartureTest& test) {
+    return test.departure == departure;
+  });
+  return at == found.end() ? nullptr : &*at;
+}
 
 const char* mode_of(OrientationFrom from) {
   return from == OrientationFrom::kLandmarks ? "OE" : "PT";
@@ -258,7 +263,10 @@ std::string sentence_of(const ModelComparison& comparison,
     case Verdict::kHolds:
       return fmt::format("{}: as calibrated; by this recording alone {}", name, size_of(test));
     case Verdict::kContradicted:
-      if (found.empty() || is_among(found, test.departure))
+      if (const DepartureTest* beside = test_of(found, test.departure);
+          beside != nullptr && found.size() > 1)
+        return fmt::format("{}: contradicted; beside the other causes {}", name, size_of(*beside));
+      if (found.empty() || found.front().departure == test.departure)
         return fmt::format("{}: contradicted; by this recording alone {}", name, size_of(test));
       return fmt::format("{}: {} if nothing else were wrong; explained by {}", name, size_of(test),
                          names_of(found));
@@ -347,9 +355,19 @@ std::string sentence_of(const JudgedZooms& zooms) {
       zooms.least_px, zooms.most_px, zooms.usual_frames, zooms.usual_px);
 }
 
+std::string sentence_of(const VerifiedLink& link) {
+  constexpr double kMilli = 1e3;
+  return fmt::format(
+      "link: telemetry comes {:.1f} +- {:.1g} ms {} against the pictures than the calibration has "
+      "it, as the motion of this recording shows; that is taken into account",
+      kMilli * std::abs(link.delay_s), kMilli * link.sigma_s,
+      link.delay_s < 0 ? "earlier" : "later");
+}
+
 std::string verification_text(const Verification& verification) {
   std::string out = fmt::format("{}\n", verification.sentence);
   if (verification.zooms) out += fmt::format("  {}\n", sentence_of(*verification.zooms));
+  if (verification.link) out += fmt::format("  {}\n", sentence_of(*verification.link));
   for (const ClaimComparison& comparison : verification.claims) {
     if (comparison.result.pairs > 0) out += fmt::format("  {}\n", comparison.sentence);
   }

@@ -19,6 +19,9 @@ namespace alidade {
 
 // "OE" or "PT".
 [[nodiscard]] const char* mode_of(OrientationFrom from);
+// Null: it is not among them.
+[[nodiscard]] const DepartureTest* test_of(const std::vector<DepartureTest>& found,
+                                           Departure departure);
 [[nodiscard]] std::string sentence_of(const ClaimComparison& comparison);
 // found: ModelCheckResult::found. One error makes many departures improbable: those that are not
 // among the found ones are said to be explained by them.
@@ -26,6 +29,7 @@ namespace alidade {
                                       const std::vector<DepartureTest>& found);
 [[nodiscard]] std::string sentence_of(const KnownComparison& comparison);
 [[nodiscard]] std::string sentence_of(const JudgedZooms& zooms);
+[[nodiscard]] std::string sentence_of(const VerifiedLink& link);
 // The verdict, with the number that matters and the likeliest causes.
 [[nodiscard]] std::string summary_of(const Verification& verification);
 

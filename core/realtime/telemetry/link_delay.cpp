@@ -67,6 +67,13 @@ void LinkDelay::begin_calibrated() {
   delay_s_ = sigma_s_ = 0;
 }
 
+void LinkDelay::begin_found(double delay_s, double sigma_s) {
+  forget();
+  state_ = LinkDelayState::kFound;
+  delay_s_ = delay_s;
+  sigma_s_ = std::max(kLeastSigma_s, sigma_s);
+}
+
 void LinkDelay::open(double sigma_s) {
   forget();
   state_ = LinkDelayState::kOpen;

@@ -56,6 +56,8 @@ class LinkDelay {
   // The connection is another one. sigma_s: of its delay, until motion shows it. Until then
   // delay_s() stays as it was.
   void open(double sigma_s = kOpenSigma_s);
+  // The delay of this connection is known from before.
+  void begin_found(double delay_s, double sigma_s);
   // Another calibration is used, whose clock offset is larger by by_s and was found through yet
   // another connection. What is known of this connection's delay stays.
   void change_calibration(double by_s);

@@ -285,9 +285,10 @@ TEST_F(CalibrateZooms, SaysWhatCannotBeOneCurve) {
     EXPECT_FALSE(fs::exists(output() + "/calibration.yaml"));
   };
   refused({a, b, "--focal-length", "1500"}, 2, "--focal-length is valid at one zoom only");
-  refused({a, a}, 1,
-          "2 of 2 stretches of constant zoom could be calibrated: calibrations at two "
-          "zoom readings or more are needed");
+  refused(
+      {a, a}, 2,
+      "all 2 stretches of constant zoom are of reading 0: recordings are calibrated together to "
+      "make a zoom curve only; calibrate the longest one alone");
   refused({a, b, "--zoom-tolerance", "-1"}, 2, "--zoom-tolerance");
   const CalibrationInput input = test::simulate(at_zoom(2, 9));
   test::write_recording(folders_["no zoom"], input);

@@ -103,10 +103,24 @@ TEST_F(VerifyTest, AWrongFocalLengthIsContradictedAndNamed) {
   EXPECT_TRUE(fs::exists(directory_.path() + "/out/verification.html"));
 }
 
-TEST_F(VerifyTest, AWrongClockOffsetIsContradictedAndNamed) {
-  const Result result = verify(recording(), changed("value: -0.0844", "value: -0.0744"));
+TEST_F(VerifyTest, AWrongClockOffsetOfThisRecordingIsContradictedAndNamed) {
+  const std::string copy = copy_of_recording();
+  fs::create_directory(copy + "/alidade");
+  fs::copy_file(changed("value: -0.0844", "value: -0.0744"), copy + "/alidade/calibration.yaml");
+  const Result result = verify(copy, copy + "/alidade/calibration.yaml");
   ASSERT_EQ(result.exit_code, 1) << result.output << result.errors;
   EXPECT_THAT(result.output, HasSubstr("likeliest cause: clock offset (off by -"));
+}
+
+// It is the link's, and another recording's calibration was made over another one.
+TEST_F(VerifyTest, TheClockOffsetOfAnotherRecordingIsFoundAnew) {
+  const Result result =
+      verify(recording(), changed("value: -0.0844", "value: -0.0744"), {"--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.output << result.errors;
+  const auto json = nlohmann::json::parse(result.output);
+  EXPECT_NEAR(json["link"]["delay_s"].get<double>(), -0.01,
+              5 * json["link"]["sigma_s"].get<double>());
+  EXPECT_LT(json["link"]["sigma_s"], 5e-3);
 }
 
 TEST_F(VerifyTest, KnownDirectionsThatAgreeHold) {

@@ -1213,12 +1213,13 @@ TEST(NoiseFile, GivesItsValuesAndNamesItsMistakes) {
   directory.write("noise.yaml",
                   "image_stamp_sigma_s: 2e-4\npan_tilt_sigma_rad: 1e-5\npixel_sigma_px: 0.3\n"
                   "pan_tilt_scale_sigma: 0.01\n"
-                  "pan_tilt_accuracy_rad: 0.001\n");
+                  "pan_tilt_accuracy_rad: 0.001\npan_tilt_quantum_rad: 3e-4\n");
   ASSERT_TRUE(load_noise(directory.path(), &noise, &error)) << error;
   EXPECT_EQ(noise.image_stamp_sigma_s, 2e-4);
   EXPECT_EQ(noise.pan_tilt_sigma_rad, 1e-5);
   EXPECT_EQ(noise.pan_tilt_scale_sigma, 0.01);
   EXPECT_EQ(noise.pan_tilt_accuracy_rad, 0.001);
+  EXPECT_EQ(noise.pan_tilt_quantum_rad, 3e-4);
   EXPECT_FALSE(noise.telemetry_stamp_sigma_s);
   const std::string path =
       directory.write("noise.yaml", "pixel_sigma_px: 0.3\nimage_stamp_sigma_s: small\n");

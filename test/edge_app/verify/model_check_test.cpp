@@ -8,6 +8,7 @@
 #include <cmath>
 #include <vector>
 
+#include "core/calibration/centre_frame.h"
 #include "test/edge_app/verify/seen_places.h"
 
 namespace alidade {
@@ -92,6 +93,19 @@ TEST(ModelCheck, NamesAWrongLens) {
   static_cast<void>(only_cause(off(Parameter::kRadialDistortion, 3), Departure::kDistortion));
   static_cast<void>(only_cause(off(Parameter::kCentreU, 20), Departure::kCentre));
   static_cast<void>(only_cause(off(Parameter::kLineDelay, 3e-6), Departure::kLineDelay));
+}
+
+// A frame that turns with the centre's estimate has the centre's error at the picture's edge alone.
+TEST(ModelCheck, AllowsForTheErrorOfACentreThatIsExactByDefinition) {
+  test::PlaceErrors errors;
+  errors.is_wide = true;
+  const Vector2<double> off(0.5, -0.5);  // px
+  errors.parameters = axes_by_centre(test::wide_calibration()) * off;
+  errors.parameters.segment<2>(index(Parameter::kCentreU)) = off;
+  const DepartureTest test = only_cause(errors, Departure::kCentre);
+  EXPECT_LT(test.log_chance, std::log(kLimit));
+  errors.centre_error_px = 0.5;
+  EXPECT_TRUE(check(7, errors).found.empty());
 }
 
 TEST(ModelCheck, NamesAGear) {

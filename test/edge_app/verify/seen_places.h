@@ -28,7 +28,9 @@ struct PlaceErrors {
   double time_jitter_s = 0;    // RMS, of the telemetry's time at each frame
   double angle_noise_rad = 0;  // RMS, of each angle, beyond what is claimed
   double shared_px = 0;  // RMS of an error that all places of a pair share, of each coordinate
-  double growth = 1;     // of the frames' errors against their covariance
+  double centre_error_px = 0;  // what the calibration claims, of each coordinate
+  bool is_wide = false;        // a field of view of 65 degrees
+  double growth = 1;           // of the frames' errors against their covariance
   // Each other frame is taken at 1.2 times f, whose calibration has errors of its own, larger ones.
   bool two_zooms = false;
 };
@@ -50,6 +52,14 @@ inline Calibration verified_calibration() {
        {Parameter::kPanAxis0, Parameter::kPanAxis1, Parameter::kTiltAxis0, Parameter::kTiltAxis1})
     sigma(axis, 1e-4);
   sigma(Parameter::kClockOffset, 1e-4);
+  return out;
+}
+
+inline Calibration wide_calibration() {
+  Calibration out = verified_calibration();
+  out.camera.focal_length = 500;
+  out.camera.distortion.only_term() = -0.05;
+  out.covariance(index(Parameter::kFocalLength), index(Parameter::kFocalLength)) = 0.05 * 0.05;
   return out;
 }
 
@@ -79,7 +89,9 @@ inline SeenPlaces see_places(std::uint64_t seed, const PlaceErrors& errors) {
   std::mt19937_64 generator(seed);
   std::normal_distribution<double> normal;
   SeenPlaces out;
-  out.calibration = verified_calibration();
+  out.calibration = errors.is_wide ? wide_calibration() : verified_calibration();
+  out.calibration.centre_error.diagonal().setConstant(errors.centre_error_px *
+                                                      errors.centre_error_px);
   const auto draw_errors = [&](const Calibration& calibration) {
     Eigen::Matrix<double, kParameterCount, 1> off = errors.parameters;
     for (int i = 0; i < kParameterCount; ++i)
