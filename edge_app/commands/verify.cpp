@@ -12,6 +12,7 @@
 #include <cstdio>
 #include <ctime>
 #include <filesystem>
+#include <initializer_list>
 #include <optional>
 #include <string>
 #include <vector>
@@ -44,12 +45,47 @@ struct VerifiedReplay {
 
 constexpr double kLater_s = 1;  // samples of so long after a frame enclose it with any clock offset
 
-std::vector<PanTiltSample> all_samples(const std::string& recording) {
-  const auto source = open_recorded_pan_tilt({recording, false});
-  std::vector<PanTiltSample> out;
+// What is read of a recording before its frames.
+struct Recorded {
+  std::string directory;
+  std::vector<FrameStamp> stamps;
+  std::vector<PanTiltSample> samples;
+};
+
+Recorded read_recorded(const std::string& directory) {
+  Recorded out{directory, {}, {}};
+  std::string error;
+  if (!read_frames_csv(directory, &out.stamps, &error)) throw CommandError(kExitUsage, error);
+  const auto source = open_recorded_pan_tilt({directory, false});
   while (const std::optional<PanTiltSample> sample = next_of<PanTiltSample>(*source))
-    out.push_back(*sample);
+    out.samples.push_back(*sample);
   return out;
+}
+
+// Gives them the samples up to a time that they do not have yet. next: the first of those.
+void add_samples(const Recorded& recorded, double until_s, std::size_t* next,
+                 std::initializer_list<OrientationStep*> steps) {
+  const std::vector<PanTiltSample>& samples = recorded.samples;
+  for (; *next < samples.size() && samples[*next].latest_time_s <= until_s; ++*next) {
+    for (OrientationStep* step : steps) step->add_telemetry(samples[*next]);
+  }
+}
+
+// visit(stamp, image): for each frame, in order. The image is lent for the call. Returns what there
+// is to say of the pictures.
+template <class Visit>
+std::vector<std::string> for_each_frame(const Recorded& recorded, const Visit& visit) {
+  RecordedImages images(recorded.directory);
+  const auto video = open_recorded_frames({recorded.directory, false, false});
+  StopSignals signals;
+  while (const std::optional<Frame> frame = next_of<Frame>(*video)) {
+    if (signals.wait(-1, 0) == StopSignals::Event::kSignal) {
+      throw CommandError(kExitUsage, recorded.directory + ": interrupted; nothing was judged");
+    }
+    const std::optional<Frame> image = images.of(frame->stamp);
+    visit(frame->stamp, view_of(image));
+  }
+  return images.remarks();
 }
 
 std::vector<KnownDirection> known_directions(const VerifyOptions& options,
@@ -78,62 +114,43 @@ FrameOrientation orientation_in(const OrientationRecord& record, RecordMode mode
              : FrameOrientation{};
 }
 
-VerifiedReplay replay_both_modes(const VerifyOptions& options, OrientationStepOptions of_step) {
-  std::string error;
-  std::vector<FrameStamp> stamps;
-  if (!read_frames_csv(options.recording, &stamps, &error)) throw CommandError(kExitUsage, error);
-  const std::vector<KnownDirection> known =
-      known_directions(options, of_step.calibration.camera, stamps);
+VerifiedReplay replay_both_modes(const Recorded& recorded, const std::vector<KnownDirection>& known,
+                                 OrientationStepOptions of_step) {
   OrientationStep by_telemetry(of_step);
   OrientationStep by_all_samples(of_step);
   of_step.oe = oe_options(of_step.calibration.camera);
   OrientationStep by_landmarks(of_step);
-  if (begins_fresh(stamps)) {
+  if (begins_fresh(recorded.stamps)) {
     by_telemetry.expect_fresh_frames();
     by_all_samples.expect_fresh_frames();
     by_landmarks.expect_fresh_frames();
   }
   const Camera<double>& camera = of_step.calibration.camera;
-  FrameCollection collection(stamps.size(), camera.width, camera.height,
+  FrameCollection collection(recorded.stamps.size(), camera.width, camera.height,
                              of_step.telemetry_noise.pan_tilt_sigma);
-  RecordedImages images(options.recording);
-  const auto video = open_recorded_frames({options.recording, false, false});
-  StopSignals signals;
   VerifiedReplay out;
-  const std::vector<PanTiltSample> samples = all_samples(options.recording);
   std::size_t now = 0;    // the first sample that has not come yet
   std::size_t later = 0;  // likewise, so much later
-  while (const std::optional<Frame> frame = next_of<Frame>(*video)) {
-    if (signals.wait(-1, 0) == StopSignals::Event::kSignal) {
-      throw CommandError(kExitUsage, options.recording + ": interrupted; nothing was judged");
-    }
-    const double received_s = frame->stamp.receive_time_s;
-    for (; now < samples.size() && samples[now].latest_time_s <= received_s; ++now) {
-      by_telemetry.add_telemetry(samples[now]);
-      by_landmarks.add_telemetry(samples[now]);
-    }
-    for (; later < samples.size() && samples[later].latest_time_s <= received_s + kLater_s; ++later)
-      by_all_samples.add_telemetry(samples[later]);
-    const std::optional<Frame> image = images.of(frame->stamp);
+  const auto visit = [&](const FrameStamp& stamp, const ImageView& image) {
+    add_samples(recorded, stamp.receive_time_s, &now, {&by_telemetry, &by_landmarks});
+    add_samples(recorded, stamp.receive_time_s + kLater_s, &later, {&by_all_samples});
     StepEvents events;
-    const OrientationRecord of_telemetry =
-        by_telemetry.add_frame(frame->stamp, ImageView{}, &events);
-    const OrientationRecord of_landmarks =
-        by_landmarks.add_frame(frame->stamp, view_of(image), &events);
-    const OrientationRecord of_all_samples =
-        by_all_samples.add_frame(frame->stamp, ImageView{}, &events);
-    collection.add(of_landmarks, of_telemetry, of_all_samples, view_of(image));
+    const OrientationRecord of_telemetry = by_telemetry.add_frame(stamp, ImageView{}, &events);
+    const OrientationRecord of_landmarks = by_landmarks.add_frame(stamp, image, &events);
+    const OrientationRecord of_all_samples = by_all_samples.add_frame(stamp, ImageView{}, &events);
+    collection.add(of_landmarks, of_telemetry, of_all_samples, image);
     for (const KnownDirection& each : known) {
-      if (each.frame != frame->stamp.frame) continue;
+      if (each.frame != stamp.frame) continue;
       out.known.push_back({each, orientation_in(of_telemetry, RecordMode::kPt),
                            orientation_in(of_landmarks, RecordMode::kOe)});
     }
     by_telemetry.maintain();
     by_all_samples.maintain();
     by_landmarks.maintain();
-  }
-  for (const std::string& remark : images.remarks()) spdlog::warn("{}", remark);
+  };
+  for (const std::string& remark : for_each_frame(recorded, visit)) spdlog::warn("{}", remark);
   out.frames = collection.frames();
+  const std::vector<PanTiltSample>& samples = recorded.samples;
   out.samples = static_cast<int>(samples.size());
   if (!samples.empty())
     out.telemetry_s = samples.back().latest_time_s - samples.front().latest_time_s;
@@ -152,34 +169,22 @@ bool is_own(const VerifyOptions& options) {
 
 // How late telemetry comes against the pictures in this recording, as `run` would find it: the
 // clock offset is the link's, and a calibration of another recording has that of another connection.
-std::optional<VerifiedLink> find_link(const VerifyOptions& options,
-                                      OrientationStepOptions of_step) {
-  std::string error;
-  std::vector<FrameStamp> stamps;
-  if (!read_frames_csv(options.recording, &stamps, &error)) throw CommandError(kExitUsage, error);
+std::optional<VerifiedLink> find_link(const Recorded& recorded, OrientationStepOptions of_step) {
   of_step.oe = oe_options(of_step.calibration.camera);
   of_step.other_connection = true;
   OrientationStep step(of_step);
-  if (begins_fresh(stamps)) step.expect_fresh_frames();
-  RecordedImages images(options.recording);
-  const auto video = open_recorded_frames({options.recording, false, false});
-  StopSignals signals;
-  const std::vector<PanTiltSample> samples = all_samples(options.recording);
+  if (begins_fresh(recorded.stamps)) step.expect_fresh_frames();
   std::size_t next = 0;
   std::optional<VerifiedLink> found;
-  while (const std::optional<Frame> frame = next_of<Frame>(*video)) {
-    if (signals.wait(-1, 0) == StopSignals::Event::kSignal) {
-      throw CommandError(kExitUsage, options.recording + ": interrupted; nothing was judged");
-    }
-    const double received_s = frame->stamp.receive_time_s;
-    for (; next < samples.size() && samples[next].latest_time_s <= received_s; ++next)
-      step.add_telemetry(samples[next]);
+  // Its remarks come again with the replay.
+  static_cast<void>(for_each_frame(recorded, [&](const FrameStamp& stamp, const ImageView& image) {
+    add_samples(recorded, stamp.receive_time_s, &next, {&step});
     StepEvents events;
-    static_cast<void>(step.add_frame(frame->stamp, view_of(images.of(frame->stamp)), &events));
+    static_cast<void>(step.add_frame(stamp, image, &events));
     if (events.link_delay && events.link_delay->state == LinkDelayState::kFound)
       found = VerifiedLink{events.link_delay->delay_s, events.link_delay->sigma_s};
     step.maintain();
-  }
+  }));
   return found;
 }
 
@@ -200,10 +205,13 @@ Verification judge_recording(const VerifyOptions& options) {
   OrientationStepOptions of_step = step_options(noise, calibration);
   of_step.zoom_tolerance = options.zoom_tolerance;
   of_step.wait_for_pace = !noise.image_stamp_sigma_s;
+  const Recorded recorded = read_recorded(options.recording);
+  const std::vector<KnownDirection> known =
+      known_directions(options, of_step.calibration.camera, recorded.stamps);
   const std::optional<VerifiedLink> link =
-      is_own(options) ? std::nullopt : find_link(options, of_step);
+      is_own(options) ? std::nullopt : find_link(recorded, of_step);
   if (link) of_step.link_delay = {LinkDelayState::kFound, link->delay_s, link->sigma_s};
-  const VerifiedReplay replay = replay_both_modes(options, of_step);
+  const VerifiedReplay replay = replay_both_modes(recorded, known, of_step);
   return verify({options.recording,
                  calibration.name,
                  replay.frames,

@@ -400,14 +400,15 @@ std::shared_ptr<const PublishedCalibration> SelfCalibration::work() {
 CalibrationReport SelfCalibration::report() const {
   CalibrationReport report;
   if (!options_.automatic) return report;
-  report.activity = is_known_here()               ? CalibrationActivity::kWatching
+  const bool is_known = is_known_here();
+  report.activity = is_known                      ? CalibrationActivity::kWatching
                     : publication_.is_withdrawn() ? CalibrationActivity::kDoubtful
                                                   : CalibrationActivity::kCollecting;
   const std::optional<CalibrationNeed> unsteady = streams_.unsteady();
   const std::optional<CalibrationNeed> missing = streams_.missing();
   if (unsteady) {
     report.need = *unsteady;
-  } else if (is_known_here() && !publication_.is_fresh_wanted()) {
+  } else if (is_known && !publication_.is_fresh_wanted()) {
     report.need = CalibrationNeed::kNothing;
   } else if (missing) {
     report.need = *missing;

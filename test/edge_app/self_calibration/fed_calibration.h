@@ -175,19 +175,17 @@ inline std::vector<Published> feed(SelfCalibration* calibration, const Simulatio
 }
 
 // What it has for the log since the last call.
-inline std::vector<std::string> lines_of(SelfCalibration& calibration) {
+inline std::vector<std::string> lines_of(SelfCalibration& calibration,
+                                         bool warnings_alone = false) {
   std::vector<std::string> out;
-  for (CalibrationMessage& message : calibration.take_messages())
-    out.push_back(std::move(message.text));
+  for (CalibrationMessage& message : calibration.take_messages()) {
+    if (message.is_warning || !warnings_alone) out.push_back(std::move(message.text));
+  }
   return out;
 }
 // Of these the warnings.
 inline std::vector<std::string> warnings_of(SelfCalibration& calibration) {
-  std::vector<std::string> out;
-  for (CalibrationMessage& message : calibration.take_messages()) {
-    if (message.is_warning) out.push_back(std::move(message.text));
-  }
-  return out;
+  return lines_of(calibration, true);
 }
 
 inline void expect_truth(const Simulation& s, const Calibration& c) {
