@@ -28,6 +28,14 @@ std::string default_password_file(const std::string& config) {
   return fs::path(config).replace_extension(".password").string();
 }
 
+// As the configuration names it: a file beside it moves with it.
+std::string name_for(const std::string& config, const std::string& file) {
+  const fs::path absolute = fs::absolute(file).lexically_normal();
+  return absolute.parent_path() == fs::absolute(config).lexically_normal().parent_path()
+             ? absolute.filename().string()
+             : absolute.string();
+}
+
 // Removes a file that was written, unless all went well.
 class Undo {
  public:
@@ -209,7 +217,7 @@ CameraSetupResult CameraSetup::run() {
   const std::string stored = default_password_file(options_.path);
   if (stores) password_name_ = fs::path(stored).filename().string();
   if (!options_.password_file.empty())
-    password_name_ = fs::absolute(options_.password_file).string();
+    password_name_ = name_for(options_.path, options_.password_file);
   if (const VideoDevice* device = find_video_device(findings_, options_.device)) {
     take_video_device(*device);
   } else if (const FoundCamera* camera = find_camera(findings_, options_.device)) {

@@ -61,7 +61,7 @@ void print_found(const CameraFindings& findings, bool json) {
                                       "\n"
                                 : text_of_findings(findings);
   std::fputs(text.c_str(), stdout);
-  std::fflush(stdout);
+  if (std::fflush(stdout) != 0) throw CommandError(kExitFailed, "stdout: cannot be written");
 }
 
 void write_configuration(const CameraFindings& findings, CameraSetupOptions setup) {

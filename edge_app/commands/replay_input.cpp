@@ -2,8 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <system_error>
+
+#include "edge_app/storage/calibration_store.h"
 
 namespace alidade {
 
@@ -11,7 +14,19 @@ namespace fs = std::filesystem;
 
 PublishedCalibration find_calibration(const std::string& recording,
                                       const std::string& calibration) {
-  if (!calibration.empty()) return require_calibration_file(calibration);
+  if (!calibration.empty()) {
+    const std::vector<std::string> zooms = calibrations_of_zooms(calibration);
+    if (!fs::exists(calibration) && !zooms.empty()) {
+      const std::size_t shown = std::min<std::size_t>(zooms.size(), 4);
+      throw CommandError(
+          kExitUsage,
+          fmt::format("{}: there is no such file, as the camera tells its zoom; give that of the "
+                      "recording's zoom: {}{}",
+                      calibration, fmt::join(zooms.begin(), zooms.begin() + shown, ", "),
+                      shown < zooms.size() ? ", ..." : ""));
+    }
+    return require_calibration_file(calibration);
+  }
   const fs::path beside = fs::path(recording) / "alidade" / "calibration.yaml";
   if (!fs::exists(beside)) {
     throw CommandError(

@@ -102,15 +102,23 @@ SceneMapConfig read_scene_map(YamlSection section, const std::string& path) {
   return scene_map;
 }
 
-RealtimeConfig read_realtime(YamlSection section) {
+// Four polls of a slow link: one until the next, as much until its answer and for a repeat, and the
+// clock offset. More than the gap between samples that is bridged would be of no use.
+double default_extrapolation_s(double rate_hz) {
+  constexpr double kPolls = 4;
+  const TelemetryLimits limits;
+  return std::clamp(kPolls / rate_hz, limits.max_extrapolation_s, limits.max_gap_s);
+}
+
+RealtimeConfig read_realtime(YamlSection section, double rate_hz) {
   RealtimeConfig realtime;
   realtime.landmarks = section.choice("mode", {"OE", "PT"}, {}).value_or("OE") == "OE";
   realtime.priority =
       section.integer("priority", {0, 99, "SCHED_FIFO priority"}).value_or(realtime.priority);
   realtime.cpu = section.integer("cpu", {0, 1023, "processor number"}).value_or(realtime.cpu);
   realtime.lock_memory = section.truth("lock_memory").value_or(realtime.lock_memory);
-  realtime.max_extrapolation_s =
-      section.number("max_extrapolation_s", {0, 10, "s"}).value_or(realtime.max_extrapolation_s);
+  realtime.max_extrapolation_s = section.number("max_extrapolation_s", {0, 10, "s"})
+                                     .value_or(default_extrapolation_s(rate_hz));
   section.finish();
   return realtime;
 }
@@ -368,7 +376,7 @@ void read_config(YamlSection& top, const std::string& path, ConfigScope scope, C
   config->scene = read_scene(scene);
   config->calibration = read_calibration(calibration, path);
   config->scene_map = read_scene_map(scene_map, path);
-  config->realtime = read_realtime(realtime);
+  config->realtime = read_realtime(realtime, config->pan_tilt.rate_hz);
   config->tracking = read_tracking(tracking, top.has("tracking"), path);
   config->detectors = read_detectors(detectors, path);
   if (scope == ConfigScope::kAll) check_ages(*config, pan_tilt, realtime);

@@ -97,8 +97,8 @@ void RecordLog::log_delay(const OutputMessage& message) {
   }
   spdlog::warn(
       "{}: it now comes {:.1f} +- {:.1f} ms {} against the pictures than when the camera was "
-      "calibrated, as motion shows at frame {}: another codec, a relay, other firmware? From here "
-      "on it is looked up accordingly",
+      "calibrated, as motion shows at frame {}: each connection has a delay of its own, as have "
+      "codecs, relays and firmware; from here on it is looked up accordingly",
       pan_tilt_.name(), std::abs(delay_ms), sigma_ms, delay_ms > 0 ? "later" : "earlier",
       *message.record.frame);
 }

@@ -150,7 +150,29 @@ std::string zoom_text(std::optional<double> zoom) {
   return zoom ? fmt::format("zoom {}", *zoom) : "any zoom";
 }
 
+// Of a folder's names, those of calibrations of zooms beside the configured file.
+std::vector<fs::path> files_of_zooms(const fs::path& file, const std::vector<std::string>& names) {
+  std::vector<fs::path> files;
+  const std::string begin = file.stem().string() + ".zoom-";
+  for (const std::string& name : names) {
+    if (name != file.filename() && begins_with(name, begin) && ends_with(name, kExtension))
+      files.push_back(folder_of(file) / name);
+  }
+  return files;
+}
+
 }  // namespace
+
+std::vector<std::string> calibrations_of_zooms(const std::string& file) {
+  std::vector<std::string> names;
+  std::string ignored;
+  static_cast<void>(list(folder_of(file), &names, &ignored));
+  std::vector<std::string> out;
+  for (const fs::path& each : files_of_zooms(file, names)) {
+    out.push_back(fs::path(file).has_parent_path() ? each.string() : each.filename().string());
+  }
+  return out;
+}
 
 CalibrationStore::CalibrationStore(std::string file, double zoom_tolerance)
     : file_(std::move(file)), zoom_tolerance_(std::max(zoom_tolerance, 0.0)) {}
@@ -180,14 +202,8 @@ std::vector<std::string> CalibrationStore::load(int width, int height, Use use) 
       lines.push_back(fmt::format("{}: {} of a killed process removed", file_,
                                   counted(removed, "unfinished file")));
   }
-  std::vector<fs::path> files;
-  if (is_there(file)) files.push_back(file);
-  const std::string begin = file.stem().string() + ".zoom-";
-  for (const std::string& name : names) {
-    if (name != file.filename() && begins_with(name, begin) && ends_with(name, kExtension)) {
-      files.push_back(folder / name);
-    }
-  }
+  std::vector<fs::path> files = files_of_zooms(file, names);
+  if (is_there(file)) files.insert(files.begin(), file);
   for (const fs::path& path : files) load_file(path.string(), width, height, &lines);
   return lines;
 }

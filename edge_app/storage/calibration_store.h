@@ -35,6 +35,10 @@ namespace alidade {
   return path + (is_between_zooms(curve, reading) ? ", between its zooms" : ", beyond its zooms");
 }
 
+// Paths of the calibrations of zooms beside a configured calibration.file, sorted; empty if there
+// are none, or the folder cannot be read.
+[[nodiscard]] std::vector<std::string> calibrations_of_zooms(const std::string& file);
+
 class CalibrationStore final : public CalibrationArchive {
  public:
   // file: the configuration's calibration.file. lock() and the first save create its folder.

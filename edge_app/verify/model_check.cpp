@@ -7,6 +7,7 @@
 
 #include "core/calibration/chance.h"
 #include "edge_app/verify/pair_equations.h"
+#include "edge_app/verify/pair_rows.h"
 
 namespace alidade {
 namespace {
@@ -107,15 +108,19 @@ std::vector<std::size_t> still_found(std::vector<std::size_t> found, double log_
 }  // namespace
 
 ModelCheckResult check_model(const std::vector<SeenFrame>& frames,
-                             const std::vector<PairRows>& pairs, const Calibration& calibration,
+                             const std::vector<PlacePair>& pairs, const Calibration& calibration,
                              const TelemetryError& telemetry_error, double motion_inflation,
                              double log_limit) {
   ModelCheckResult out;
-  if (pairs.empty()) return out;
-  PairEquations equations(frames, pairs, calibration, telemetry_error, motion_inflation);
+  std::vector<PairRows> rows = pair_rows(frames, pairs, OrientationFrom::kAllSamples);
+  if (rows.empty()) return out;
+  rows = pair_rows_at(
+      PairEquations(frames, rows, calibration, telemetry_error, motion_inflation).frame_errors(),
+      frames, pairs);
+  PairEquations equations(frames, rows, calibration, telemetry_error, motion_inflation);
   equations.sum();
-  out.pairs = static_cast<int>(pairs.size());
-  for (const PairRows& pair : pairs) out.places += static_cast<int>(pair.places.size());
+  out.pairs = static_cast<int>(rows.size());
+  for (const PairRows& pair : rows) out.places += static_cast<int>(pair.places.size());
   out.noise_ratio = equations.noise_ratio();
   for (std::size_t d = 0; d < equations.departures().size(); ++d)
     out.tests.push_back(equations.test(d));

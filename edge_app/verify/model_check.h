@@ -9,6 +9,8 @@
 // Jitter and noise of telemetry add to C instead: a^2 B_i B_i^T to the covariance of frame i's
 // errors. a maximises the likelihood; twice the logarithm of its gain over a = 0 is 0 or, in half
 // of the cases, chi-square with one degree of freedom if a is 0.
+// X and Z are those of the orientations that fit the pictures best without any departure: what
+// multiplies a rate would be biased by the rate's error.
 // The noise of the pictures is measured: by the residuals, and by the scatter of the pairs' parts
 // of s. Departures are found one after the other, the least probable first, until none is
 // improbable or four are found; of these the ones are kept that explain most for their number. rad,
@@ -20,7 +22,7 @@
 
 #include "core/model/calibration.h"
 #include "core/model/telemetry_error.h"
-#include "edge_app/verify/pair_rows.h"
+#include "edge_app/verify/place_pairs.h"
 
 namespace alidade {
 
@@ -76,7 +78,7 @@ struct ModelCheckResult {
 // share telemetry samples. log_limit: a departure with a smaller log_chance is found. calibration:
 // of these frames' lens, with its covariance.
 [[nodiscard]] ModelCheckResult check_model(const std::vector<SeenFrame>& frames,
-                                           const std::vector<PairRows>& pairs,
+                                           const std::vector<PlacePair>& pairs,
                                            const Calibration& calibration,
                                            const TelemetryError& telemetry_error,
                                            double motion_inflation, double log_limit);

@@ -46,12 +46,23 @@ PairEquations::PairEquations(const std::vector<SeenFrame>& frames,
   set_roots();
 }
 
-void PairEquations::sum() {
+void PairEquations::sum_with_noise() {
   add_up_pairs();
-  add_up();
-  solve();
+  take_noise();
   measure_noise();
   add_up_pairs();
+}
+
+std::vector<Vector4<double>> PairEquations::frame_errors() {
+  sum_with_noise();
+  take_noise();
+  std::vector<Vector4<double>> out;
+  for (std::size_t i = 0; i < frames_.size(); ++i) out.emplace_back(error_of_frame(i));
+  return out;
+}
+
+void PairEquations::sum() {
+  sum_with_noise();
   pair_scatter_ = pair_scatter();
 }
 
@@ -359,13 +370,14 @@ DepartureTest PairEquations::test_noise(std::size_t d) {
   return out;
 }
 
+Vector4<double> PairEquations::error_of_frame(std::size_t frame) const {
+  return frame_roots_[frame] *
+         solution_.segment<kFrameErrors>(kFrameErrors * static_cast<int>(frame));
+}
+
 std::vector<Vector2<double>> PairEquations::left_of(const PairRows& pair) const {
   Eigen::VectorXd x(2 * kFrameErrors + shared());
-  const auto of_frame = [this](std::size_t frame) -> Vector4<double> {
-    return frame_roots_[frame] *
-           solution_.segment<kFrameErrors>(kFrameErrors * static_cast<int>(frame));
-  };
-  x << of_frame(pair.first), of_frame(pair.second),
+  x << error_of_frame(pair.first), error_of_frame(pair.second),
       solution_.segment(kFrameErrors * static_cast<int>(frames_.size()), shared());
   std::vector<Vector2<double>> out;
   for (const PlaceRow& place : pair.places)

@@ -27,6 +27,9 @@ class PairEquations {
   [[nodiscard]] const std::vector<DepartureColumns>& departures() const { return departures_; }
   [[nodiscard]] double noise_ratio() const { return noise_ratio_; }
 
+  // Each frame's likeliest errors if there are no departures. In place of sum().
+  [[nodiscard]] std::vector<Vector4<double>> frame_errors();
+
   // Comes first. Sums the equations up, with the noise that residuals show.
   void sum();
 
@@ -66,6 +69,9 @@ class PairEquations {
 
   void add_up_pairs();
 
+  // The sums of all pairs, and the solution with the noise that residuals show.
+  void sum_with_noise();
+
   // The frames' claimed covariances, with the noises as they are taken to be.
   void set_roots();
 
@@ -103,6 +109,9 @@ class PairEquations {
 
   // Leaves the size of `d` and the sums as they were.
   DepartureTest test_noise(std::size_t d);
+
+  // By the solution; not whitened.
+  [[nodiscard]] Vector4<double> error_of_frame(std::size_t frame) const;
 
   // What the solution leaves of the residuals of a pair, place by place.
   [[nodiscard]] std::vector<Vector2<double>> left_of(const PairRows& pair) const;

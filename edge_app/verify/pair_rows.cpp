@@ -33,6 +33,34 @@ bool linearise(const FrameOrientation& first, const FrameOrientation& second,
   return true;
 }
 
+FrameOrientation with(const Vector4<double>& error, FrameOrientation frame) {
+  frame.angle = {frame.angle.pan + error[0], frame.angle.tilt + error[1]};
+  frame.rate = {frame.rate.pan + error[2], frame.rate.tilt + error[3]};
+  frame.motion_sensitivity = telemetry_sensitivity(frame.calibration.mechanics, frame.motion());
+  return frame;
+}
+
+// visit(row): may change a row before it is kept.
+template <class OrientationOf, class Visit>
+std::vector<PairRows> rows_of(const std::vector<PlacePair>& pairs,
+                              const OrientationOf& orientation_of, const Visit& visit) {
+  std::vector<PairRows> out;
+  for (const PlacePair& pair : pairs) {
+    const FrameOrientation& first = orientation_of(pair.first);
+    const FrameOrientation& second = orientation_of(pair.second);
+    if (first.mode == OrientationMode::kNone || second.mode == OrientationMode::kNone) continue;
+    PairRows rows{pair.first, pair.second, {}};
+    for (const PlaceMatch& match : pair.places) {
+      PlaceRow row;
+      if (!linearise(first, second, match, &row)) continue;
+      visit(pair, &row);
+      rows.places.push_back(row);
+    }
+    if (!rows.places.empty()) out.push_back(std::move(rows));
+  }
+  return out;
+}
+
 }  // namespace
 
 bool is_same_zoom(const FrameOrientation& a, const FrameOrientation& b) {
@@ -42,19 +70,26 @@ bool is_same_zoom(const FrameOrientation& a, const FrameOrientation& b) {
 
 std::vector<PairRows> pair_rows(const std::vector<SeenFrame>& frames,
                                 const std::vector<PlacePair>& pairs, OrientationFrom from) {
-  std::vector<PairRows> out;
-  for (const PlacePair& pair : pairs) {
-    const FrameOrientation& first = orientation(frames[pair.first], from);
-    const FrameOrientation& second = orientation(frames[pair.second], from);
-    if (first.mode == OrientationMode::kNone || second.mode == OrientationMode::kNone) continue;
-    PairRows rows{pair.first, pair.second, {}};
-    for (const PlaceMatch& match : pair.places) {
-      PlaceRow row;
-      if (linearise(first, second, match, &row)) rows.places.push_back(row);
-    }
-    if (!rows.places.empty()) out.push_back(std::move(rows));
-  }
-  return out;
+  return rows_of(
+      pairs,
+      [&](std::size_t frame) -> const FrameOrientation& {
+        return orientation(frames[frame], from);
+      },
+      [](const PlacePair&, PlaceRow*) {});
+}
+
+std::vector<PairRows> pair_rows_at(const std::vector<Vector4<double>>& errors,
+                                   const std::vector<SeenFrame>& frames,
+                                   const std::vector<PlacePair>& pairs) {
+  std::vector<FrameOrientation> corrected;
+  corrected.reserve(frames.size());
+  for (std::size_t i = 0; i < frames.size(); ++i)
+    corrected.push_back(with(errors[i], frames[i].by_all_samples));
+  return rows_of(
+      pairs, [&](std::size_t frame) -> const FrameOrientation& { return corrected[frame]; },
+      [&](const PlacePair& pair, PlaceRow* row) {
+        row->residual += row->J_first * errors[pair.first] + row->J_second * errors[pair.second];
+      });
 }
 
 }  // namespace alidade

@@ -55,4 +55,12 @@ inline constexpr double kSameZoom = 1e-3;  // of f
                                               const std::vector<PlacePair>& pairs,
                                               OrientationFrom from);
 
+// Likewise by all samples, linearised where each frame has these errors instead of none; r still
+// has the whole of e_first and e_second. What multiplies a rate, as the line delay's column does,
+// is biased by the rate's error (errors in variables) unless the pictures correct it first.
+// errors: of each frame.
+[[nodiscard]] std::vector<PairRows> pair_rows_at(const std::vector<Vector4<double>>& errors,
+                                                 const std::vector<SeenFrame>& frames,
+                                                 const std::vector<PlacePair>& pairs);
+
 }  // namespace alidade

@@ -94,10 +94,11 @@ bool is_at_zoom_of(const SeenFrame& frame, const SeenFrame& reference) {
   return is_same_zoom(frame.by_telemetry, reference.by_telemetry);
 }
 
-std::vector<PairRows> at_one_zoom(const std::vector<SeenFrame>& frames,
-                                  const std::vector<PairRows>& pairs, const SeenFrame& reference) {
-  std::vector<PairRows> out;
-  for (const PairRows& pair : pairs) {
+std::vector<PlacePair> at_one_zoom(const std::vector<SeenFrame>& frames,
+                                   const std::vector<PlacePair>& pairs,
+                                   const SeenFrame& reference) {
+  std::vector<PlacePair> out;
+  for (const PlacePair& pair : pairs) {
     const auto is_there = [&](std::size_t frame) {
       return is_at_zoom_of(frames[frame], reference);
     };
@@ -165,6 +166,29 @@ Extent extent_of(const std::vector<const SeenFrame*>& frames) {
   return out;
 }
 
+// RMS of both axes, rad/s.
+double usual_rate(const std::vector<SeenFrame>& frames) {
+  double square = 0;
+  for (const SeenFrame& frame : frames) square += frame.by_all_samples.rate.vector().squaredNorm();
+  return std::sqrt(square / (2 * static_cast<double>(frames.size())));
+}
+
+// What the noise would have to be stated as; empty if neither jitter nor noise was found.
+std::string advice_of_noise(const VerifyInput& input, const std::vector<DepartureTest>& found) {
+  const auto size_of_noise = [&found](Departure departure) {
+    const DepartureTest* test = test_of(found, departure);
+    return test == nullptr ? 0.0 : test->size.front();
+  };
+  const double jitter_rad = usual_rate(input.frames) * size_of_noise(Departure::kTimeJitter);
+  const double noise_rad = size_of_noise(Departure::kAngleNoise);
+  if (!(jitter_rad > 0 || noise_rad > 0)) return "";
+  return fmt::format(
+      "set pan_tilt.angle_sigma_rad: {:.2g}, which is what is stated now, the noise and the jitter "
+      "at this recording's speeds together, and calibrate again; a recording keeps what was stated "
+      "when it was made (pan_tilt_sigma_rad in its noise.yaml)",
+      std::hypot(input.telemetry_sigma_rad, noise_rad, jitter_rad));
+}
+
 std::vector<std::string> advice_for(const VerifyInput& input, const Verification& verification) {
   std::vector<std::string> out;
   if (input.frames.size() < 2) {
@@ -207,6 +231,8 @@ std::vector<std::string> advice_for(const VerifyInput& input, const Verification
         "the clock offset is that of the link, which `run` finds anew at each start: did pictures "
         "or angles come later or earlier for a part of the recording?");
   }
+  if (std::string noise = advice_of_noise(input, verification.found); !noise.empty())
+    out.push_back(std::move(noise));
   if (verification.pairs < kReturnsLeast && out.empty())
     out.push_back(fmt::format("record longer, {:g} s or more, over a scene with more texture",
                               kVerificationAsked_s));
@@ -254,7 +280,6 @@ Verification verify(const VerifyInput& input) {
   const std::vector<PlacePair> pairs = match_places(frames);
   out.by_landmarks = pair_rows(frames, pairs, OrientationFrom::kLandmarks);
   out.by_telemetry = pair_rows(frames, pairs, OrientationFrom::kTelemetry);
-  out.by_all_samples = pair_rows(frames, pairs, OrientationFrom::kAllSamples);
   out.pairs = static_cast<int>(out.by_telemetry.size());
   out.zooms = judged_zooms(frames);
   out.link = input.link;
@@ -264,11 +289,10 @@ Verification verify(const VerifyInput& input) {
   const double log_limit = std::log(out.chance_limit);
   if (!out.by_telemetry.empty()) {
     const SeenFrame& reference = frames[usual_zoom(frames)];
-    const std::vector<PairRows> one_zoom = at_one_zoom(frames, out.by_all_samples, reference);
     const Calibration& calibration = reference.by_telemetry.calibration;
-    const ModelCheckResult model =
-        check_model(frames, one_zoom, calibration, input.telemetry_error,
-                    motion_inflation(input, OrientationFrom::kAllSamples), log_limit);
+    const ModelCheckResult model = check_model(
+        frames, at_one_zoom(frames, pairs, reference), calibration, input.telemetry_error,
+        motion_inflation(input, OrientationFrom::kAllSamples), log_limit);
     out.places = model.places;
     out.noise_ratio = model.noise_ratio;
     out.found = model.found;

@@ -103,7 +103,7 @@ struct Verification {
   std::vector<KnownComparison> known;   // landmarks, then telemetry; empty: nothing is known
   std::vector<DepartureTest> found;     // see ModelCheckResult; empty if pairs < kReturnsLeast
   // For plots: one entry for each pair that could be compared.
-  std::vector<PairRows> by_landmarks, by_telemetry, by_all_samples;
+  std::vector<PairRows> by_landmarks, by_telemetry;
 };
 
 // A comparison with fewer independent numbers, or fewer than kReturnsLeast pairs, is not judged.

@@ -337,6 +337,8 @@ std::string summary_of(const Verification& v) {
   const bool by_claims = worst != nullptr && worst->verdict == Verdict::kContradicted;
   if (by_known) parts.push_back(known->sentence);
   if (by_claims) parts.push_back(differ);
+  if (!by_claims && !by_known && !differ.empty())
+    parts.push_back("a cause is found, though " + differ);
   std::string causes;
   for (const DepartureTest& found : v.found) {
     causes += (causes.empty() ? "likeliest cause: " : ", then: ");

@@ -4,6 +4,7 @@ import re
 from . import cpp
 
 FILE = "edge_app/commands/command_line.cpp"
+SIMULATOR = ("alidade-simulate", "test/simulator/main.cpp")
 OPTIONS = ("add_option", "add_flag", "add_prior", "add_turn")
 
 
@@ -49,10 +50,24 @@ def commands():
     return out
 
 
+def virtual_camera():
+    """(name, what it does, rows) of the program that plays a camera."""
+    name, file = SIMULATOR
+    body = dict(cpp.functions(file))["run"]
+    text = cpp.string(re.search(rf"CLI::App app\(({cpp.STRING})\)", body)[1])
+    _, _, rows = command(name, text, body)
+    flag = next(a for _, a in cpp.calls(body, ("set_version_flag",)))
+    return name, text.rstrip("."), [*rows, (cpp.string(flag[0]), "print the version", body)]
+
+
+def all_commands():
+    return [*commands(), virtual_camera()]
+
+
 def tables():
     """{command: its table}"""
     out = {}
-    for name, text, rows in commands():
+    for name, text, rows in all_commands():
         lines = [text + ".", "", "| option | required | meaning |", "|---|---|---|", *(row(*one) for one in rows)]
         out[name] = "\n".join(lines)
     return out

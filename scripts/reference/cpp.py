@@ -25,7 +25,7 @@ def text_of_file(path):
 def functions(path):
     """(name, body) of each function that begins in the first column."""
     text = text_of(path)
-    heads = list(re.finditer(r"^[\w:<>,&* \[\]]*?\b(\w+)\([^;{}]*\)(?: const)? \{\n", text, re.MULTILINE))
+    heads = list(re.finditer(r"^(?! )[\w:<>,&* \[\]]*?\b(\w+)\([^;{}]*\)(?: const)? \{\n", text, re.MULTILINE))
     for head in heads:
         end = text.index("\n}\n", head.start())
         yield head[1], text[head.end():end]
@@ -65,6 +65,21 @@ def string(argument):
     if not parts or re.sub(STRING, "", argument).strip():
         return None
     return "".join(parts).replace('\\"', '"').replace("\\n", "\n")
+
+
+@functools.lru_cache(None)
+def member_values():
+    """{name: values} with which members of that name begin, or which a function of edge_app gives them: numbers, truths, texts."""
+    found = {}
+    value = rf'(-?[\d.]+(?:e-?\d+)?|true|false|"[^"]*")'
+    for room in ("core", "platform", "edge_app"):
+        for path in sorted((TOP / room).rglob("*")):
+            if path.suffix in (".h", ".cpp"):
+                text = text_of(path.relative_to(TOP).as_posix())
+                for name, one in re.findall(rf"^ *[\w:]+ (\w+) = {value};", text, re.MULTILINE) if path.suffix == ".h" else \
+                        re.findall(rf"\boptions\.(?:\w+\.)?(\w+) = {value};", text):
+                    found.setdefault(name, set()).add(one.strip('"'))
+    return found
 
 
 @functools.lru_cache(None)

@@ -66,7 +66,7 @@ def endpoints():
                     out += [] if "$ref" in schema else ["", *schema_table(schema)]
             if asked := one.get("parameters"):
                 out += ["", *(f"- `{p['name']}` ({p['in']}): {line(p.get('description', ''))}" for p in asked)]
-            out += ["", "Answers: " + "; ".join(answers) + "." + (f" Errors: {', '.join(refused)}." if refused else ""), ""]
+            out += ["", "Answers: " + ". ".join(answer.rstrip(".") for answer in answers) + "." + (f" Errors: {', '.join(refused)}." if refused else ""), ""]
     return "\n".join(out)
 
 

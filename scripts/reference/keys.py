@@ -137,6 +137,37 @@ def read_by_code():
     return found
 
 
+def defaults():
+    """{(section, key): values} of `.value_or(...)` behind what reads a key: a literal, or what a member of that name begins with."""
+    found = {}
+    for file in FILES:
+        for name, body in cpp.functions(file):
+            for reader in re.finditer(rf"\b({'|'.join(READERS)})\(", body):
+                arguments = cpp.arguments(body, reader.end() - 1)
+                if not arguments or not (key := cpp.string(arguments[0])):
+                    continue
+                rest = after_call(body, reader.end() - 1)
+                if not (given := re.match(r"\s*\.value_or\(", rest)):
+                    continue
+                default = cpp.arguments(rest, given.end() - 1)[0]
+                literal = re.fullmatch(r'"(.*)"|(-?[\d.]+(?:e-?\d+)?|true|false)', default)
+                values = {literal[1] or literal[2]} if literal else cpp.member_values().get(re.sub(r"^.*\W", "", default), set())
+                for section in SECTIONS.get(name) or []:
+                    found.setdefault((section, key), set()).update(values)
+    return found
+
+
+def after_call(text, begin):
+    """What follows the call whose bracket opens at `begin`."""
+    depth, place = 0, begin
+    while True:
+        string = re.match(cpp.STRING, text[place:])
+        depth += 0 if string else (text[place] in "([{") - (text[place] in ")]}")
+        place += len(string[0]) if string else 1
+        if depth == 0:
+            return text[place:]
+
+
 def of_helper(file, name, kind):
     """The cells of the one reader in a function that takes the key's name from its caller."""
     body = dict(cpp.functions(file))[name]

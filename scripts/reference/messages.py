@@ -1,10 +1,10 @@
 """The tables of words and lines that a user meets: words that the program says of itself, with the help of messages.yaml; lines of the
-log; findings of `alidade check`, which say what helps themselves."""
+log; findings of `alidade check` (findings.py), which say what helps themselves."""
 import re
 
 import yaml
 
-from . import cpp
+from . import cpp, findings, recordings
 
 LIST = "docs/manual/reference/messages.yaml"
 # Group of words: the functions that say them, and their files.
@@ -74,25 +74,12 @@ def log_lines():
     return found
 
 
-def findings():
-    """(problem or advice, text) of each that `check` may say."""
-    out = {}
-    for path in sorted([*(cpp.TOP / "edge_app/check").glob("*.cpp"), *(cpp.TOP / "edge_app/commands").glob("check*.cpp")]):
-        text = cpp.text_of(path.relative_to(cpp.TOP).as_posix())
-        for kind, a in cpp.calls(text, ("add_problem", "add_advice")):
-            for group in re.findall(r'(?:"(?:[^"\\]|\\.)*"\s*)+', a[1] if len(a) > 1 else ""):
-                said = line(re.sub(r"^(?:video|pan/tilt)? ?\{\}:? ?|^\{\}", "", cpp.string(group)))
-                if len(said.split()) > 5:
-                    out[said] = kind[4:]
-    return out
-
-
 def helps(group, needed):
     listed = yaml.safe_load((cpp.TOP / LIST).read_text(encoding="utf-8")).get(group, {})
     for what, missing in (("lacks", [one for one in needed if one not in listed]), ("has what no code says:", [one for one in listed if one not in needed])):
         if missing:
             raise cpp.ListError(f"{LIST}: {group}: {what} " + "; ".join(map(repr, missing)))
-    return listed
+    return {words: recordings.said(text) for words, text in listed.items()}
 
 
 def tables():
@@ -105,5 +92,5 @@ def tables():
     listed = helps("lines of the log", lines)
     out["lines of the log"] = "\n".join(["| line | level | meaning, and what helps |", "|---|---|---|",
                                          *(f"| {text} | {kind} | {listed[text]} |" for text, kind in sorted(lines.items()))])
-    out["findings of check"] = "\n".join(["| kind | text |", "|---|---|", *(f"| {kind} | {text} |" for text, kind in findings().items())])
+    out["findings of check"] = findings.table()
     return out

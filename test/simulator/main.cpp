@@ -46,8 +46,8 @@ int run(int argc, char** argv) {
   CLI::App app("A virtual pan-tilt-zoom camera with known truth.");
   std::string config_file;
   std::string output;
-  CLI::Option* config_option =
-      app.add_option("-c,--config", config_file, "configuration (YAML); or");
+  CLI::Option* config_option = app.add_option("-c,--config", config_file,
+                                              "configuration (YAML); this or --example is needed");
   std::string example;
   app.add_option(
          "--example", example,

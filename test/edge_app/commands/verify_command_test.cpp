@@ -202,6 +202,13 @@ TEST_F(VerifyTest, WhatCannotBeJudgedEndsWithTwo) {
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(last_line(result.errors), HasSubstr("has no calibration"));
 
+  directory_.write("copy/lens.zoom-7.yaml", "");
+  result = verify(recording(), copy + "/lens.yaml");
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(last_line(result.errors),
+              AllOf(HasSubstr("lens.yaml: there is no such file"),
+                    HasSubstr("of the recording's zoom: " + copy + "/lens.zoom-7.yaml")));
+
   result = verify(recording(), changed("width: 480", "width: 640"));
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(last_line(result.errors), HasSubstr("frames have 480x270 px"));

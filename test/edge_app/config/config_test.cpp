@@ -522,6 +522,20 @@ TEST_F(ConfigTest, MjpegAndOnvifSourcesAreRead) {
   EXPECT_EQ(config_.pan_tilt.ptz_path, ":8080/ptz");
 }
 
+// Between polls, at rest and behind a late link, the newest angle of a slow link is older.
+TEST_F(ConfigTest, ASlowLinkMayHaveOlderAngles) {
+  const auto limit_at = [this](const std::string& rate) {
+    EXPECT_THAT(load("video: {type: mjpeg, url: 'http://camera/v'}\n"
+                     "pan_tilt: {type: onvif, url: http://camera" +
+                     rate + "}\ncamera: {focal_length_px: 1000}\n"),
+                IsEmpty());
+    return config_.realtime.max_extrapolation_s;
+  };
+  EXPECT_DOUBLE_EQ(limit_at(""), 0.4);
+  EXPECT_DOUBLE_EQ(limit_at(", rate_hz: 30"), 0.25);
+  EXPECT_DOUBLE_EQ(limit_at(", rate_hz: 1"), 0.5);
+}
+
 TEST_F(ConfigTest, SaysWhereALoginGoesAndHow) {
   for (const std::string video :
        {"rtsp, url: 'rtsp://camera/s'", "mjpeg, url: 'http://camera/v'"}) {

@@ -218,6 +218,10 @@ TEST_F(CalibrationStoreTest, HasOneForEachZoom) {
   EXPECT_EQ(first.find({}), nullptr);
   EXPECT_THAT(files(), AllOf(Contains("calibration.zoom-100.yaml"),
                              Contains("calibration.zoom-200.5.yaml")));
+  const std::string folder = fs::path(path()).parent_path();
+  EXPECT_THAT(calibrations_of_zooms(path()), ElementsAre(folder + "/calibration.zoom-100.yaml",
+                                                         folder + "/calibration.zoom-200.5.yaml"));
+  EXPECT_THAT(calibrations_of_zooms(folder + "/other.yaml"), IsEmpty());
   ASSERT_TRUE(first.save(some(5000), &error)) << error;
   CalibrationStore again = store(2);
   EXPECT_EQ(again.load(kWidth, kHeight).size(), 3U);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/calibration/centre_frame.h"
+#include "edge_app/verify/verification_words.h"
 #include "test/edge_app/verify/seen_places.h"
 
 namespace alidade {
@@ -21,8 +22,7 @@ constexpr double kLimit = 4e-4;
 
 ModelCheckResult check(std::uint64_t seed, const test::PlaceErrors& errors) {
   const test::SeenPlaces seen = test::see_places(seed, errors);
-  return check_model(seen.frames, pair_rows(seen.frames, seen.pairs, OrientationFrom::kAllSamples),
-                     seen.calibration, {}, 1, std::log(kLimit));
+  return check_model(seen.frames, seen.pairs, seen.calibration, {}, 1, std::log(kLimit));
 }
 
 // Of the departure that is found, and of no other one before it.
@@ -62,6 +62,29 @@ TEST(ModelCheck, FindsNothingMoreOftenThanChanceHasItInAModelThatHolds) {
   EXPECT_GE(alarms, 1);
   // 1 % of the runs by Bonferroni; three of 40 have a chance of 0.7 %.
   EXPECT_LT(found, 3);
+}
+
+// Errors in variables: what multiplies an uncertain rate, as the line delay does.
+TEST(ModelCheck, IsNotBiasedByUncertainRates) {
+  constexpr int kRuns = 40;
+  test::PlaceErrors errors;
+  errors.is_wide = true;
+  errors.rate_sigma_rad_s = 0.03;
+  for (const Departure departure : {Departure::kLineDelay, Departure::kClockOffset}) {
+    SCOPED_TRACE(static_cast<int>(departure));
+    double sum = 0;
+    double square = 0;
+    for (int run = 0; run < kRuns; ++run) {
+      const ModelCheckResult result = check(static_cast<std::uint64_t>(run + 1), errors);
+      const DepartureTest* test = test_of(result.tests, departure);
+      ASSERT_NE(test, nullptr);
+      sum += test->size.front() / test->sigma.front();
+      square += test->chi_square;
+    }
+    // Four sigmas each.
+    EXPECT_LT(std::abs(sum / kRuns), 4 / std::sqrt(kRuns));
+    EXPECT_NEAR(square / kRuns, 1, 4 * std::sqrt(2.0 / kRuns));
+  }
 }
 
 // As compressed pictures have them: neither a departure nor noise of telemetry.

@@ -28,9 +28,10 @@ struct PlaceErrors {
   double time_jitter_s = 0;    // RMS, of the telemetry's time at each frame
   double angle_noise_rad = 0;  // RMS, of each angle, beyond what is claimed
   double shared_px = 0;  // RMS of an error that all places of a pair share, of each coordinate
-  double centre_error_px = 0;  // what the calibration claims, of each coordinate
-  bool is_wide = false;        // a field of view of 65 degrees
-  double growth = 1;           // of the frames' errors against their covariance
+  double centre_error_px = 0;      // what the calibration claims, of each coordinate
+  bool is_wide = false;            // a field of view of 65 degrees
+  double rate_sigma_rad_s = 1e-3;  // claimed, and drawn
+  double growth = 1;               // of the frames' errors against their covariance
   // Each other frame is taken at 1.2 times f, whose calibration has errors of its own, larger ones.
   bool two_zooms = false;
 };
@@ -84,7 +85,6 @@ inline SeenPlaces see_places(std::uint64_t seed, const PlaceErrors& errors) {
   constexpr int kPlaces = 8;
   constexpr double kPicture_px = 0.05;
   constexpr double kAngle_rad = 3e-5;
-  constexpr double kRate_rad_s = 1e-3;
   constexpr double kReach_rad = 0.1;
   std::mt19937_64 generator(seed);
   std::normal_distribution<double> normal;
@@ -126,13 +126,15 @@ inline SeenPlaces see_places(std::uint64_t seed, const PlaceErrors& errors) {
     seen = is;
     seen.calibration = calibrations[zoom];
     seen.motion_covariance.diagonal().head<2>().setConstant(kAngle_rad * kAngle_rad);
-    seen.motion_covariance.diagonal().segment<2>(2).setConstant(kRate_rad_s * kRate_rad_s);
+    seen.motion_covariance.diagonal().segment<2>(2).setConstant(errors.rate_sigma_rad_s *
+                                                                errors.rate_sigma_rad_s);
     seen.motion_sensitivity = telemetry_sensitivity(seen.calibration.mechanics, is.motion());
     const Eigen::Matrix<double, 6, 1> by_parameters = seen.motion_sensitivity * offs[zoom];
     seen.angle.pan -= by_parameters[0] + errors.growth * kAngle_rad * normal(generator);
     seen.angle.tilt -= by_parameters[1] + errors.growth * kAngle_rad * normal(generator);
-    seen.rate.pan -= by_parameters[2] + errors.growth * kRate_rad_s * normal(generator);
-    seen.rate.tilt -= by_parameters[3] + errors.growth * kRate_rad_s * normal(generator);
+    seen.rate.pan -= by_parameters[2] + errors.growth * errors.rate_sigma_rad_s * normal(generator);
+    seen.rate.tilt -=
+        by_parameters[3] + errors.growth * errors.rate_sigma_rad_s * normal(generator);
     seen.angle.pan += errors.pan_gear_rad * std::sin(3 * kPi * is.angle.pan / kReach_rad);
     seen.angle.tilt += errors.tilt_play_rad / 2 * frame.heading.tilt;
     if (errors.time_jitter_s > 0) {

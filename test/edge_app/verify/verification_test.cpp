@@ -71,6 +71,27 @@ TEST(Verification, HoldsInWordsAlsoWithoutReturnsThatAreJudged) {
   EXPECT_EQ(summary_of(verification), "sigmas hold: 33 pairs of pictures show no departure");
 }
 
+// A wrong value need not show in the directions of this recording.
+TEST(Verification, SaysThatDirectionsAgreeThoughACauseIsFound) {
+  Verification verification;
+  verification.verdict = Verdict::kContradicted;
+  DepartureTest cause;
+  cause.departure = Departure::kLineDelay;
+  cause.size = {2e-6};
+  cause.sigma = {4.6e-7};
+  verification.found = {cause};
+  ClaimComparison claim;
+  claim.verdict = Verdict::kHolds;
+  claim.result.ratio = 0.8;
+  claim.result.low = 0.7;
+  verification.claims = {claim};
+  EXPECT_THAT(
+      summary_of(verification),
+      HasSubstr("a cause is found, though directions of the same place differ by 0.80 times"));
+  verification.claims.front().verdict = Verdict::kContradicted;
+  EXPECT_THAT(summary_of(verification), Not(HasSubstr("though")));
+}
+
 TEST(Verification, HasJsonAndAPageWithEscapedNames) {
   Verification verification;
   verification.sentence = "not judged: <nothing>";
