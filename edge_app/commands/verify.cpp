@@ -19,12 +19,14 @@
 
 #include "core/calibration/number_text.h"
 #include "core/model/angle.h"
+#include "core/realtime/telemetry/renewal_age.h"
 #include "edge_app/clocks/fresh_beginning.h"
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/output_directory.h"
 #include "edge_app/commands/replay_input.h"
 #include "edge_app/commands/stop_signals.h"
 #include "edge_app/config/noise_file.h"
+#include "edge_app/self_calibration/stale_repeats.h"
 #include "edge_app/verify/verification.h"
 #include "edge_app/verify/verification_json.h"
 #include "edge_app/verify/verification_report.h"
@@ -157,6 +159,18 @@ VerifiedReplay replay_both_modes(const Recorded& recorded, const std::vector<Kno
   return out;
 }
 
+bool is_seldom_new(const std::vector<PanTiltSample>& samples, const OrientationStepOptions& of) {
+  const TelemetryNoise& noise = of.telemetry_noise;
+  RenewalAge age(RenewalAge::least_turn(noise.pan_tilt_sigma, noise.resolution),
+                 of.telemetry_limits.max_repeat_s);
+  for (const PanTiltSample& sample : samples) {
+    if (sample.restarted) age.restart();
+    if (sample.device_time_s || sample.sequence) return false;
+    static_cast<void>(age.add(middle_time_s(sample), sample.pan_rad, sample.tilt_rad));
+  }
+  return age.is_seldom();
+}
+
 // Whether the calibration was made from this recording, or was in use during it.
 bool is_own(const VerifyOptions& options) {
   if (options.calibration.empty()) return true;
@@ -220,7 +234,8 @@ Verification judge_recording(const VerifyOptions& options) {
                  replay.telemetry_s > 0 ? (replay.samples - 1) / replay.telemetry_s : 0,
                  replay.known,
                  {turn_sigma_of(options.heading_sigma), turn_sigma_of(options.level_sigma)},
-                 link});
+                 link,
+                 is_seldom_new(recorded.samples, of_step)});
 }
 
 int exit_code_of(Verdict verdict) {

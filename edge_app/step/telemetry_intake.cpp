@@ -43,6 +43,8 @@ TelemetryIntake::Taken TelemetryIntake::add(const PanTiltSample& sample) {
     filtered_ = filtered;
     measured_count_ = 0;
     first_.reset();
+    age_.restart();
+    last_stored_s_.reset();
     correction_.forget_state();
   }
   is_lost_ = false;
@@ -62,7 +64,8 @@ TelemetryIntake::Taken TelemetryIntake::add(const PanTiltSample& sample) {
     forget_old_first(timed);
   }
   step_.add(timed.pan, timed.tilt);
-  if (resolution_shown() != resolution_) {
+  const bool knows_age = !clock && age_.add(timed.time_s, timed.pan, timed.tilt);
+  if (knows_age || resolution_shown() != resolution_) {
     resolution_ = resolution_shown();
     store_again();
   }
@@ -100,6 +103,11 @@ TelemetrySample TelemetryIntake::store(const TelemetrySample& measured) {
     correction_.forget_state();
   }
   TelemetrySample corrected = measured;
+  if (!filtered_ && last_stored_s_) {
+    const double since_s = std::max(0.0, measured.time_s - *last_stored_s_);
+    corrected.time_sigma_s = std::hypot(measured.time_sigma_s, age_.sigma_s(since_s));
+  }
+  last_stored_s_ = measured.time_s;
   correction_.correct(&corrected);
   static_cast<void>(samples_.push(corrected));
   return corrected;
@@ -119,6 +127,7 @@ double TelemetryIntake::resolution_shown() const {
 }
 
 void TelemetryIntake::store_again() {
+  last_stored_s_.reset();
   correction_.forget_state();
   samples_ = empty(filtered_);
   const std::size_t kept = std::min(measured_count_, kMeasuredKept);

@@ -11,6 +11,7 @@
 
 #include "core/model/clock_filter.h"
 #include "core/realtime/telemetry/angle_step.h"
+#include "core/realtime/telemetry/renewal_age.h"
 #include "core/realtime/telemetry/telemetry_buffer.h"
 #include "core/realtime/telemetry/telemetry_correction.h"
 #include "edge_app/clocks/capture_clock.h"
@@ -36,7 +37,9 @@ class TelemetryIntake {
       : options_(options),
         clock_(options.clock),
         resolution_(options.noise.resolution),
-        samples_(empty(false)) {}
+        samples_(empty(false)),
+        age_(RenewalAge::least_turn(options.noise.pan_tilt_sigma, options.noise.resolution),
+             options.limits.max_repeat_s) {}
 
   struct Taken {
     bool restarted = false;        // earlier times cannot be asked for any more
@@ -89,6 +92,8 @@ class TelemetryIntake {
   Samples samples_;
   TelemetryCorrection correction_;
   AngleStep step_;
+  RenewalAge age_;                       // of polled samples
+  std::optional<double> last_stored_s_;  // the time of the last sample that was put into the buffer
   std::array<TelemetrySample, kMeasuredKept> measured_{};  // ring buffer
   std::size_t measured_count_ = 0;                         // since the buffer was emptied
   std::optional<TelemetrySample> first_;  // of polled samples, until the angles change

@@ -36,14 +36,20 @@ double chi_square_limit(int freedom, double log_limit) {
 // too, and would count against the departure itself where departures are compared.
 double full_chi_square(const DepartureTest& test) { return test.chi_square * test.scatter; }
 
+bool contains(const std::vector<Departure>& all, Departure one) {
+  return std::find(all.begin(), all.end(), one) != all.end();
+}
+
 // One after the other, each the least probable beside those before.
-std::vector<std::size_t> found_in_turn(double log_limit, PairEquations* equations) {
+std::vector<std::size_t> found_in_turn(double log_limit, const std::vector<Departure>& not_judged,
+                                       PairEquations* equations) {
   std::vector<std::size_t> found;
   while (found.size() < kMostFound) {
     std::optional<std::size_t> worst;
     double least = 0;
     for (std::size_t d = 0; d < equations->departures().size(); ++d) {
       if (std::find(found.begin(), found.end(), d) != found.end()) continue;
+      if (contains(not_judged, equations->departures()[d].departure)) continue;
       const DepartureTest test = equations->test(d);
       if (!(test.log_chance < log_limit)) continue;
       const double log_chance = internal::log_chance(full_chi_square(test), test.freedom);
@@ -110,7 +116,7 @@ std::vector<std::size_t> still_found(std::vector<std::size_t> found, double log_
 ModelCheckResult check_model(const std::vector<SeenFrame>& frames,
                              const std::vector<PlacePair>& pairs, const Calibration& calibration,
                              const TelemetryError& telemetry_error, double motion_inflation,
-                             double log_limit) {
+                             double log_limit, const std::vector<Departure>& not_judged) {
   ModelCheckResult out;
   std::vector<PairRows> rows = pair_rows(frames, pairs, OrientationFrom::kAllSamples);
   if (rows.empty()) return out;
@@ -122,9 +128,11 @@ ModelCheckResult check_model(const std::vector<SeenFrame>& frames,
   out.pairs = static_cast<int>(rows.size());
   for (const PairRows& pair : rows) out.places += static_cast<int>(pair.places.size());
   out.noise_ratio = equations.noise_ratio();
-  for (std::size_t d = 0; d < equations.departures().size(); ++d)
+  for (std::size_t d = 0; d < equations.departures().size(); ++d) {
     out.tests.push_back(equations.test(d));
-  std::vector<std::size_t> found = found_in_turn(log_limit, &equations);
+    if (contains(not_judged, out.tests.back().departure)) out.tests.back().freedom = 0;
+  }
+  std::vector<std::size_t> found = found_in_turn(log_limit, not_judged, &equations);
   const bool has_noise =
       std::any_of(found.begin(), found.end(), [&](std::size_t d) { return equations.is_noise(d); });
   if (found.size() > 1)

@@ -76,11 +76,12 @@ struct ModelCheckResult {
 
 // motion_inflation: >= 1, factor of the variances of the frames' errors, as neighbouring frames
 // share telemetry samples. log_limit: a departure with a smaller log_chance is found. calibration:
-// of these frames' lens, with its covariance.
+// of these frames' lens, with its covariance. not_judged: have no freedom, and are never found.
 [[nodiscard]] ModelCheckResult check_model(const std::vector<SeenFrame>& frames,
                                            const std::vector<PlacePair>& pairs,
                                            const Calibration& calibration,
                                            const TelemetryError& telemetry_error,
-                                           double motion_inflation, double log_limit);
+                                           double motion_inflation, double log_limit,
+                                           const std::vector<Departure>& not_judged = {});
 
 }  // namespace alidade

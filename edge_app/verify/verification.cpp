@@ -231,6 +231,12 @@ std::vector<std::string> advice_for(const VerifyInput& input, const Verification
         "the clock offset is that of the link, which `run` finds anew at each start: did pictures "
         "or angles come later or earlier for a part of the recording?");
   }
+  if (input.telemetry_is_seldom_new) {
+    out.emplace_back(
+        "the head's device repeats its angles while it turns, so that the time of an angle and the "
+        "rates are uncertain, and the line delay is not judged: ask it for angles less often, or "
+        "three times as often as it renews them (pan_tilt.rate_hz; `alidade check`, line changes)");
+  }
   if (std::string noise = advice_of_noise(input, verification.found); !noise.empty())
     out.push_back(std::move(noise));
   if (verification.pairs < kReturnsLeast && out.empty())
@@ -292,7 +298,9 @@ Verification verify(const VerifyInput& input) {
     const Calibration& calibration = reference.by_telemetry.calibration;
     const ModelCheckResult model = check_model(
         frames, at_one_zoom(frames, pairs, reference), calibration, input.telemetry_error,
-        motion_inflation(input, OrientationFrom::kAllSamples), log_limit);
+        motion_inflation(input, OrientationFrom::kAllSamples), log_limit,
+        input.telemetry_is_seldom_new ? std::vector{Departure::kLineDelay}
+                                      : std::vector<Departure>());
     out.places = model.places;
     out.noise_ratio = model.noise_ratio;
     out.found = model.found;

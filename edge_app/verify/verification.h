@@ -79,6 +79,9 @@ struct VerifyInput {
   std::vector<KnownSight> known = {};     // empty: nothing is known from outside
   TurnSigma turn_sigma = {};              // of the platform against the known directions' axes
   std::optional<VerifiedLink> link = {};  // frames have it already; empty: the calibration's own
+  // The head's device repeats its angles while it turns (RenewalAge). Its rates then err all alike,
+  // as polls and renewals keep their phase, and would pass for a line delay: that is not judged.
+  bool telemetry_is_seldom_new = false;
 };
 
 // Focal lengths of a recording that zooms, px.

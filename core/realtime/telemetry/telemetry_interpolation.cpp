@@ -29,6 +29,9 @@ struct Weights {
   Rows<2> of_sample = Rows<2>::Zero();
   // Effect of an acceleration of 1 rad/s^2 on (angle, rate) that the sums do not contain.
   Vector2<double> acceleration_effect = Vector2<double>::Zero();
+  // s; effect on the rate, apart from that, of an acceleration of 1 rad/s^2 that begins, ends or
+  // turns round between the samples: RMS.
+  double jerk_effect = 0;
 };
 
 // Variance of one sample's angle, without the errors of its time.
@@ -44,7 +47,11 @@ Weights line_weights(const TelemetryKnot* knots, int before, double time_s) {
   weights.of_sample.col(before) << 1 - l, -1 / period;
   weights.of_sample.col(before + 1) << l, 1 / period;
   if (!knots[before + 1].held) {
+    // From -1 to 1 rad/s^2 at any moment between the samples leaves, at their middle, an RMS of this
+    // share of the period: 2 sqrt(1/320).
+    constexpr double kJerk = 0.112;
     weights.acceleration_effect << -l * (1 - l) * period * period / 2, (l - 0.5) * period;
+    weights.jerk_effect = kJerk * period;
   }
   return weights;
 }
@@ -79,14 +86,12 @@ bool cubic_weights(const TelemetryKnot* knots, int count, double time_s, const A
   const double scale = 0.5 * (knots[count - 1].time_s - knots[0].time_s);
   // The rows 1, x, x^2, x^3 at the samples, made orthonormal: rows = R^T Q, R upper triangular.
   Rows<kCubicCoefficients> Q = Rows<kCubicCoefficients>::Zero();
-  double own_variance = 0;
   for (int i = 0; i < count; ++i) {
     const double x = (knots[i].time_s - time_s) / scale;
     Q(0, i) = 1;
     Q(1, i) = x;
     Q(2, i) = x * x;
     Q(3, i) = x * x * x;
-    own_variance += knots[i].own_variance / count;
   }
   Matrix4<double> R = Matrix4<double>::Zero();
   for (int i = 0; i < kCubicCoefficients; ++i) {
@@ -115,11 +120,17 @@ bool cubic_weights(const TelemetryKnot* knots, int count, double time_s, const A
     Rows<1> residual = angles.row(axis);
     for (int i = 0; i < kCubicCoefficients; ++i) residual -= residual.dot(Q.row(i)) * Q.row(i);
     const double rate = angles.row(axis).dot(to_coefficients.row(1)) / scale;
-    if (!(residual.squaredNorm() <= bound * (variance + own_variance * rate * rate))) return false;
+    // Each by its own variance: a sample whose time is hardly known must not excuse the others.
+    double square = 0;
+    for (int i = 0; i < count; ++i) {
+      square += residual[i] * residual[i] / (variance + knots[i].own_variance * rate * rate);
+    }
+    if (!(square <= bound)) return false;
     // Count it only if noise cannot explain it.
     const double acceleration = to_acceleration * angles.row(axis).dot(to_coefficients.row(2));
-    const double square = acceleration * acceleration;
-    (*acceleration_square)[axis] = square > 4 * acceleration_variance ? square : 0;
+    const double acceleration_squared = acceleration * acceleration;
+    (*acceleration_square)[axis] =
+        acceleration_squared > 4 * acceleration_variance ? acceleration_squared : 0;
   }
   weights->of_sample.row(0) = to_coefficients.row(0);
   weights->of_sample.row(1) = to_coefficients.row(1) / scale;
@@ -235,6 +246,8 @@ bool interpolate(const TelemetryNoise& noise, const TelemetryKnot* knots, int co
           effect[i] * effect[j] * acceleration_square;
     }
   }
+  covariance.diagonal().tail<2>() +=
+      weights.jerk_effect * weights.jerk_effect * acceleration_square;
   // E[(a tau^2 / 2)^2] of a normal tau: the effect of a time error where the mount turns round and
   // the rate is 0.
   covariance.diagonal().head<2>() +=

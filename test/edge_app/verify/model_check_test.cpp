@@ -87,6 +87,14 @@ TEST(ModelCheck, IsNotBiasedByUncertainRates) {
   }
 }
 
+TEST(ModelCheck, FindsNoDepartureThatIsNotJudged) {
+  const test::SeenPlaces seen = test::see_places(7, off(Parameter::kLineDelay, 3e-6));
+  const ModelCheckResult result = check_model(seen.frames, seen.pairs, seen.calibration, {}, 1,
+                                              std::log(kLimit), {Departure::kLineDelay});
+  EXPECT_EQ(test_of(result.tests, Departure::kLineDelay)->freedom, 0);
+  EXPECT_EQ(test_of(result.found, Departure::kLineDelay), nullptr);
+}
+
 // As compressed pictures have them: neither a departure nor noise of telemetry.
 TEST(ModelCheck, TakesErrorsThatThePlacesOfAPairShareForThePictures) {
   constexpr int kRuns = 20;
