@@ -68,6 +68,27 @@ void judge_repeats(TelemetryReport* report, const TelemetryNeeds& needs) {
                   std::ceil(100 * kReserve * report->longest_change_s - kRounding) / 100));
 }
 
+// The times of a device's renewals are unknown within an interval of polls, while the head turns;
+// only many more polls would narrow that down. Slower polls with one interval for each renewal or
+// more see no repeats, and the age that is left is part of the clock offset.
+void judge_renewals(TelemetryReport* report, const TelemetryNeeds& needs) {
+  constexpr double kOften = 3;  // polls for each renewal
+  constexpr double kAlmost = 0.95;
+  constexpr double kRarely = 0.02;
+  if (!report->change_hz || !report->interval_s || report->turning == 0 || !needs.rate_hz) return;
+  const double share = static_cast<double>(report->stale) / static_cast<double>(report->turning);
+  const double polls_hz = 1 / report->interval_s->median;
+  const double renewals_hz = *report->rate_hz * (1 - share);
+  if (share < kRarely || polls_hz > kAlmost * kOften * renewals_hz) return;
+  add_advice(&report->findings,
+             fmt::format("pan/tilt {}: while the head turns, it renews its angles about {:.0f} "
+                         "times a second and is asked {:.0f} times, so an angle's time is known to "
+                         "{:.0f} ms only: set pan_tilt.rate_hz to {:.0f} or less or, if it can "
+                         "answer so often, to {:.0f} or more",
+                         needs.source, renewals_hz, polls_hz, 1e3 / polls_hz,
+                         std::floor(renewals_hz / 2), std::ceil(kOften * renewals_hz)));
+}
+
 // Rounding to steps of q has a standard deviation of q / sqrt(12). If that exceeds the noise that
 // run assumes, its sigmas are too small unless q is configured.
 void judge_resolution(TelemetryReport* report, const TelemetryNeeds& needs) {
@@ -214,6 +235,7 @@ TelemetryReport check_telemetry(const std::vector<PanTiltSample>& samples,
   }
   judge_rate(&report, needs);
   judge_repeats(&report, needs);
+  judge_renewals(&report, needs);
   judge_resolution(&report, needs);
   judge_bounds(&report, needs);
   judge_zoom(&report, needs);

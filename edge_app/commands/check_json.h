@@ -1,6 +1,6 @@
 #pragma once
 // The report of `alidade check` as one line of JSON: its numbers and all findings. The unit is part
-// of each name; an unknown value is null. edge_app/check/README.md lists the keys. Pure; allocates.
+// of each name; an unknown value is null. The keys: docs/manual/reference/json-of-commands.md. Pure; allocates.
 
 #include <optional>
 #include <string>

@@ -91,6 +91,18 @@ TEST(TelemetryCheck, MeasuresHowOftenADeviceMeasures) {
   EXPECT_LT(report.fresh.size(), 160U);
 }
 
+TEST(TelemetryCheck, AdvisesPollsThatDoNotBeatWithRenewals) {
+  const TelemetryReport report = check(samples_of([](double t) { return swing(held(t, 20)); }));
+  EXPECT_THAT(advice(report.findings),
+              ElementsAre(AllOf(HasSubstr("renews its angles about 20 times a second and is asked "
+                                          "30 times, so an angle's time is known to 33 ms only"),
+                                HasSubstr("to 10 or less or, if it can answer so often, to 60"))));
+  TelemetryNeeds pushed = needs();
+  pushed.rate_hz.reset();
+  EXPECT_THAT(check(samples_of([](double t) { return swing(held(t, 20)); }), pushed).findings,
+              IsEmpty());
+}
+
 TEST(TelemetryCheck, SaysWhatMaxRepeatHasToBe) {
   TelemetryNeeds needed = needs();
   needed.limits.max_repeat_s = 0;

@@ -84,6 +84,29 @@ TEST(TelemetryIntake, LeavesOutAFirstAngleThatMayBeOld) {
   EXPECT_NEAR(device.at().rate.pan, kRate, 1e-2);
 }
 
+// Its repeats show that no angle's time is known: renewals and polls beat.
+TEST(TelemetryIntake, AllowsForTheAgeOfAnglesThatADeviceRenewsByItself) {
+  constexpr double kRate = 0.5;  // rad/s
+  constexpr double kPolls_s = 0.04;
+  constexpr double kRenewal_s = 0.05;
+  double square = 0;
+  int count = 0;
+  SlowDevice device;
+  for (int i = 1; i < 250; ++i) {
+    const double t = kPolls_s * i + 1e-3;
+    device.poll(t, kRate * kRenewal_s * std::floor(t / kRenewal_s));
+    const double asked_s = t - 0.13;
+    if (i < 20 || !has_result(device.ask(asked_s))) continue;
+    // Of the mean age, the clock offset would know.
+    const double error = device.at().angle.pan - kRate * (asked_s - 0.5 * kPolls_s);
+    square += error * error / device.at().covariance(0, 0);
+    ++count;
+  }
+  ASSERT_GT(count, 200);
+  EXPECT_LT(square / count, 1.5);
+  EXPECT_GT(square / count, 0.05);
+}
+
 TEST(TelemetryIntake, KeepsAFirstAngleThatStoodForLong) {
   SlowDevice device;
   for (int i = 1; i <= 8; ++i) device.poll(0.025 * i, 0.1);

@@ -114,6 +114,53 @@ TEST(TelemetryInterpolation, LineMissesTheExpectedAccelerationByItsCovariance) {
   }
 }
 
+// The acceleration begins, or turns round, anywhere between the samples: by the sum over a fine grid.
+TEST(TelemetryInterpolation, CoversTheRateOfAnAccelerationThatBeginsBetweenSamples) {
+  constexpr double kAcceleration = 2;  // rad/s^2
+  constexpr double kPeriod_s = 0.1;
+  TelemetryNoise noise;
+  noise.pan_tilt_sigma = 1e-9;
+  noise.acceleration_sigma = kAcceleration;
+  for (const double before : {0.0, -kAcceleration}) {
+    for (const double share : {0.0, 0.2, 0.5, 0.8, 1.0}) {
+      double square = 0;
+      constexpr int kSteps = 400;
+      for (int i = 0; i < kSteps; ++i) {
+        const double turn_s = kPeriod_s * (i + 0.5) / kSteps;
+        const auto rate = [&](double t) {
+          return before * std::min(t, turn_s) + kAcceleration * std::max(0.0, t - turn_s);
+        };
+        const double pan = before * turn_s * turn_s / 2 + before * turn_s * (kPeriod_s - turn_s) +
+                           kAcceleration * std::pow(kPeriod_s - turn_s, 2) / 2;
+        const std::array<TelemetryKnot, 2> knots = {
+            {{0, 0, 0, 0, 0, false}, {kPeriod_s, pan, 0, 0, 0, false}}};
+        InterpolatedPanTilt out;
+        ASSERT_TRUE(interpolate(noise, knots.data(), 2, 0, share * kPeriod_s, 0,
+                                Vector2<double>::Zero(), &out));
+        square += std::pow(rate(share * kPeriod_s) - out.rate.pan, 2) / out.covariance(2, 2);
+      }
+      EXPECT_LT(square / kSteps, 1.02) << before << " " << share;
+      EXPECT_GT(square / kSteps, 0.05) << before << " " << share;
+    }
+  }
+}
+
+// With it a cubic would be believed that misses all the others.
+TEST(TelemetryInterpolation, ASampleOfUnknownTimeExcusesNoOther) {
+  TelemetryNoise noise;
+  noise.pan_tilt_sigma = 1e-4;
+  std::array<TelemetryKnot, 8> knots{};
+  for (int i = 0; i < 8; ++i) {
+    const double t = 0.1 * (i - 3.5);
+    // At rest, then in motion at once.
+    knots[static_cast<std::size_t>(i)] = {t, std::max(0.0, 0.3 * t), 0, 0, 1e-7, false};
+  }
+  knots[4].own_variance = 0.013;
+  InterpolatedPanTilt out;
+  ASSERT_TRUE(interpolate(noise, knots.data(), 8, 4, 0.09, 0, Vector2<double>::Zero(), &out));
+  EXPECT_EQ(out.samples, 2);
+}
+
 // Whichever neighbours the answer rests on, at uneven steps: they show the acceleration that is there.
 // Where the mount turns round its rate is 0, and an error tau of the time asked for makes a tau^2 / 2: the variance is the
 // mean square of that over a normal tau, by the sum over a fine grid.
