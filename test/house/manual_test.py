@@ -145,7 +145,7 @@ class Links(unittest.TestCase):
             for target in re.findall(r"\{download\}`[^<]*<([^>]*)>`|^```\{literalinclude\} (\S+)", text, re.MULTILINE):
                 seen += 1
                 self.assertTrue((MANUAL / page).parent.joinpath(target[0] or target[1]).is_file(), f"{page}: {target}")
-        self.assertGreater(seen, 3)
+        self.assertGreater(seen, 2)
 
 
 class Reference(unittest.TestCase):

@@ -49,11 +49,10 @@ int run(int argc, char** argv) {
   CLI::Option* config_option = app.add_option("-c,--config", config_file,
                                               "configuration (YAML); this or --example is needed");
   std::string example;
-  app.add_option(
-         "--example", example,
-         "a camera that comes with the program: paper, zoom or cheap_dome; its truth goes to "
-         "the folder truth here")
-      ->check(CLI::IsMember({"paper", "zoom", "cheap_dome"}))
+  app.add_option("--example", example,
+                 "a camera that comes with the program: tutorial, paper, zoom or cheap_dome; its "
+                 "truth goes to the folder truth here")
+      ->check(CLI::IsMember({"tutorial", "paper", "zoom", "cheap_dome"}))
       ->excludes(config_option);
   std::string size;
   app.add_option(

@@ -10,6 +10,9 @@ void scale(ZoomConfig::Ends* ends, double factor) {
   ends->tele *= factor;
 }
 
+// RTP carries JPEG only in multiples of 8.
+bool is_for_rtp_jpeg(int width, int height) { return width % 8 == 0 && height % 8 == 0; }
+
 }  // namespace
 
 void resize(const std::string& size, Config* config) {
@@ -24,6 +27,10 @@ void resize(const std::string& size, Config* config) {
   }
   const double factor = static_cast<double>(width) / config->image.width;
   config->camera.line_delay *= static_cast<double>(config->image.height) / height;
+  if (config->live.encoding.codec == VideoCodec::kMjpeg && !is_for_rtp_jpeg(width, height) &&
+      is_for_rtp_jpeg(config->image.width, config->image.height)) {
+    config->live.encoding.codec = VideoCodec::kH264;
+  }
   config->image.width = width;
   config->image.height = height;
   config->camera.focal_length *= factor;

@@ -1,6 +1,7 @@
 #pragma once
 // The same camera with pictures of another size: all lengths in px are scaled with the width, and
-// reading out a frame takes as long as before. Angles and the distortion stay.
+// reading out a frame takes as long as before. Angles and the distortion stay. Live JPEG becomes H.264
+// where RTP does not carry JPEG of the new size.
 
 #include "test/simulator/config.h"
 

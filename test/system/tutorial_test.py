@@ -14,6 +14,7 @@ import unittest
 from harness import ALIDADE, DEADLINE_S, SIMULATE, Process, SystemTest, free_port
 
 MANUAL = pathlib.Path(__file__).resolve().parents[2] / "docs/manual"
+TUTORIAL_CAMERA = MANUAL.parents[1] / "test/simulator/examples/tutorial_camera.yaml"
 sys.path.insert(0, str(MANUAL.parents[1] / "test/house"))
 sys.dont_write_bytecode = True
 from manual_test import blocks  # noqa: E402: after the line above
@@ -49,7 +50,8 @@ class Tutorial(SystemTest):
                 for line in content.strip().splitlines()]
 
     def start_camera(self):
-        text = self.with_free_ports((MANUAL / "files/virtual-camera.yaml").read_text(encoding="utf-8"))
+        # As --example tutorial does, but for the ports.
+        text = self.with_free_ports(TUTORIAL_CAMERA.read_text(encoding="utf-8"))
         (self.folder / "virtual-camera.yaml").write_text(text, encoding="utf-8")
         camera = Process(SIMULATE, "-c", self.folder / "virtual-camera.yaml")
         self.processes.append(camera)
