@@ -165,7 +165,7 @@ void CameraSetup::take_keys() {
 }
 
 std::string CameraSetup::text() const {
-  return config_.text({"Written by alidade discover for " + escaped(camera_name_) + ".",
+  return config_.text({"Written by alidade for " + escaped(camera_name_) + ".",
                        "Every key: /usr/share/doc/alidade/examples/alidade.yaml"});
 }
 

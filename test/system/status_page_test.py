@@ -3,7 +3,6 @@
 program goes away and comes back."""
 import json
 import math
-import os
 import re
 import signal
 import subprocess
@@ -11,13 +10,11 @@ import unittest
 import urllib.error
 import urllib.request
 
-from selenium import webdriver
 from selenium.webdriver import ActionChains, Keys
-from selenium.webdriver.chrome.options import Options
-from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.by import By
 
-from harness import ALIDADE, CLOCK_OFFSET_MS, DEADLINE_S, SystemTest, free_port, wait_until
+from browser import BrowserTest
+from harness import ALIDADE, CLOCK_OFFSET_MS, DEADLINE_S, free_port, wait_until
 
 SETTINGS = {
     "image": {"width": 640, "height": 480, "rate_hz": 10},
@@ -140,18 +137,7 @@ TOO_UNCERTAIN = {
                  "path_rad": [[-.12, -.02], [0, .02], [.12, -.02]], "largest_rate_rad_s": .05}}
 
 
-class StatusPage(SystemTest):
-    def setUp(self):
-        super().setUp()
-        options = Options()
-        for argument in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--disable-gpu",
-                         "--window-size=1280,900"):
-            options.add_argument(argument)
-        options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-        self.browser = webdriver.Chrome(service=Service(os.environ["CHROMIUM_DRIVER"]), options=options)
-        self.addCleanup(self.browser.quit)
-        self.browser.set_script_timeout(DEADLINE_S)
-
+class StatusPage(BrowserTest):
     def start(self, config, **environment):
         """`alidade run`; gives back the process and the page's address, once it listens."""
         run = self.alidade("run", "-c", config, **environment)
@@ -171,13 +157,6 @@ class StatusPage(SystemTest):
         return self.write_config(camera, **sections, video={"width": image["width"], "height": image["height"]},
                                  focal_length_px=SETTINGS["camera"]["focal_length_px"], realtime={"mode": mode},
                                  output={"json": True, "http": "127.0.0.1:0", **output}, tracking={}, detectors=detectors or {})
-
-    def text(self, name):
-        return self.browser.execute_script("return document.getElementById(arguments[0]).textContent", name)
-
-    def wait_for_text(self, name, pattern):
-        wait_until(lambda: re.search(pattern, self.text(name)), f"{pattern!r} in #{name}, where {self.text(name)!r} is")
-        return self.text(name)
 
     def assert_no_errors_but(self, expected):
         for entry in self.browser.get_log("browser"):
@@ -450,10 +429,6 @@ class StatusPage(SystemTest):
                 self.screenshot("ground_phone.png")
         self.browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
         self.browser.find_element(By.ID, "ground-title").click()
-
-    def screenshot(self, name):
-        if "ALIDADE_SCREENSHOTS" in os.environ:
-            self.browser.save_screenshot(os.path.join(os.environ["ALIDADE_SCREENSHOTS"], name))
 
     def shows_targets(self, address):
         """Something flies where the middle of the picture is: its box, its name, the plan and the table."""

@@ -34,7 +34,10 @@ function streamText(stream) {
 function telemetryText(telemetry) {
   if (telemetry.type === null) return 'pan and tilt: none';
   if (telemetry.answers === null) return `pan and tilt: ${telemetry.type}, not asked: it wants a login`;
-  if (!telemetry.answers) return `pan and tilt: ${telemetry.type}, no answer: ${telemetry.error}`;
+  if (!telemetry.answers) {
+    const how = telemetry.error.includes('pan_range_deg') ? 'in units of its own' : 'no answer';
+    return `pan and tilt: ${telemetry.type}, ${how}: ${telemetry.error}`;
+  }
   return `pan ${telemetry.pan_deg.toFixed(2)} deg, tilt ${telemetry.tilt_deg.toFixed(2)} deg (${telemetry.type})`;
 }
 
@@ -116,7 +119,7 @@ element('look').onclick = () => busy(element('said'), 'asking the camera ...', a
 });
 element('setup').onsubmit = (event) => {
   event.preventDefault();
-  const keys = [];
+  const keys = element('keys').value.split('\n').map((key) => key.trim()).filter((key) => key);
   if (element('pan').value) keys.push(`pan_tilt.pan_range_deg=[${element('pan').value}]`);
   if (element('tilt').value) keys.push(`pan_tilt.tilt_range_deg=[${element('tilt').value}]`);
   busy(element('said'), 'trying video and pan and tilt ...', async () => {
