@@ -7,6 +7,7 @@
 
 #include "core/calibration/number_text.h"
 #include "core/model/angle.h"
+#include "core/realtime/telemetry/renewal_age.h"
 #include "edge_app/check/telemetry_measures.h"
 #include "edge_app/self_calibration/stale_repeats.h"
 
@@ -68,25 +69,32 @@ void judge_repeats(TelemetryReport* report, const TelemetryNeeds& needs) {
                   std::ceil(100 * kReserve * report->longest_change_s - kRounding) / 100));
 }
 
-// The times of a device's renewals are unknown within an interval of polls, while the head turns;
-// only many more polls would narrow that down. Slower polls with one interval for each renewal or
-// more see no repeats, and the age that is left is part of the clock offset.
-void judge_renewals(TelemetryReport* report, const TelemetryNeeds& needs) {
-  constexpr double kOften = 3;  // polls for each renewal
-  constexpr double kAlmost = 0.95;
-  constexpr double kRarely = 0.02;
-  if (!report->change_hz || !report->interval_s || report->turning == 0 || !needs.rate_hz) return;
-  const double share = static_cast<double>(report->stale) / static_cast<double>(report->turning);
+// A device that renews its angles by a clock of its own, about as often as it is asked: an angle's
+// time is unknown within an interval of polls. Only many more polls would narrow that down. With one
+// poll for two renewals or more there is no repeat, and the usual age is part of the clock offset.
+void judge_renewals(const std::vector<PanTiltSample>& samples, const TelemetryNeeds& needs,
+                    TelemetryReport* report) {
+  constexpr double kAboutAsOften = 0.45;  // new angles for each poll
+  constexpr double kTimes = 3;
+  if (!report->change_hz || !report->interval_s || !needs.rate_hz) return;
+  const double step =
+      std::max({needs.resolution_rad, report->pan.resolution, report->tilt.resolution});
+  RenewalAge age(RenewalAge::least_turn(needs.angle_sigma_rad, step), needs.limits.max_repeat_s);
+  for (const PanTiltSample& sample : samples) {
+    if (sample.restarted) age.restart();
+    static_cast<void>(age.add(middle_time_s(sample), sample.pan_rad, sample.tilt_rad));
+  }
   const double polls_hz = 1 / report->interval_s->median;
-  const double renewals_hz = *report->rate_hz * (1 - share);
-  if (share < kRarely || polls_hz > kAlmost * kOften * renewals_hz) return;
-  add_advice(&report->findings,
-             fmt::format("pan/tilt {}: while the head turns, it renews its angles about {:.0f} "
-                         "times a second and is asked {:.0f} times, so an angle's time is known to "
-                         "{:.0f} ms only: set pan_tilt.rate_hz to {:.0f} or less or, if it can "
-                         "answer so often, to {:.0f} or more",
-                         needs.source, renewals_hz, polls_hz, 1e3 / polls_hz,
-                         std::floor(renewals_hz / 2), std::ceil(kOften * renewals_hz)));
+  if (!age.is_seldom() || *report->change_hz < kAboutAsOften * polls_hz) return;
+  add_advice(
+      &report->findings,
+      fmt::format("pan/tilt {}: it is asked {:.0f} times a second and, while the head turns, "
+                  "sometimes repeats an angle: it renews them about as often, by a clock of "
+                  "its own, so an angle's time is known to {:.0f} ms only; set "
+                  "pan_tilt.rate_hz to {:.0f} or less or, if it can answer so often, to "
+                  "{:.0f} or more",
+                  needs.source, polls_hz, 1e3 / polls_hz, std::floor(polls_hz / kTimes),
+                  std::ceil(polls_hz * kTimes)));
 }
 
 // Rounding to steps of q has a standard deviation of q / sqrt(12). If that exceeds the noise that
@@ -235,7 +243,7 @@ TelemetryReport check_telemetry(const std::vector<PanTiltSample>& samples,
   }
   judge_rate(&report, needs);
   judge_repeats(&report, needs);
-  judge_renewals(&report, needs);
+  judge_renewals(usable, needs, &report);
   judge_resolution(&report, needs);
   judge_bounds(&report, needs);
   judge_zoom(&report, needs);

@@ -225,7 +225,7 @@ CameraSetupResult CameraSetup::run() {
   }
   take_head();
   config_.set("calibration", "file", "calibration.yaml");
-  config_.set("output", "json", "true");
+  config_.set("output", "json", "false");
   config_.set_text("output", "http", "127.0.0.1:8080");
   config_.set_text("output", "recordings", "recordings");
   // Until the size of the pictures is known for certain.

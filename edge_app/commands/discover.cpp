@@ -105,6 +105,10 @@ int discover_cameras(const DiscoverOptions& options) {
     write_configuration(findings, setup);
     return kExitOk;
   }
+  const FoundCamera* const named =
+      options.device.empty() ? nullptr : find_camera(findings, options.device);
+  if (named != nullptr && !named->report.error.empty() && !named->report.wants_login)
+    throw CommandError(kExitFailed, named->device.host + ": " + named->report.error);
   if (!findings.cameras.empty() || !findings.video_devices.empty()) return kExitOk;
   throw CommandError(
       kExitFailed,

@@ -48,21 +48,8 @@ void read_onvif(YamlSection& section, PanTiltConfig* pan_tilt) {
   pan_tilt->profile = section.text("profile").value_or("");
   pan_tilt->pan_range_deg = read_range(section, "pan_range_deg");
   pan_tilt->tilt_range_deg = read_range(section, "tilt_range_deg");
-  if (pan_tilt->pan_range_deg.has_value() != pan_tilt->tilt_range_deg.has_value()) {
-    section.fail(pan_tilt->pan_range_deg ? "tilt_range_deg" : "pan_range_deg",
-                 "is missing; give pan_range_deg and tilt_range_deg, or neither");
-  }
   pan_tilt->pan_scale = read_scale(section, "pan_scale");
   pan_tilt->tilt_scale = read_scale(section, "tilt_scale");
-  if (pan_tilt->pan_scale.has_value() != pan_tilt->tilt_scale.has_value()) {
-    section.fail(pan_tilt->pan_scale ? "tilt_scale" : "pan_scale",
-                 "is missing; give pan_scale and tilt_scale, or neither");
-  }
-  if (pan_tilt->pan_scale && !pan_tilt->pan_range_deg) {
-    section.fail("pan_scale",
-                 "is what the device tells at both ends of pan_range_deg, which is missing; give "
-                 "pan_range_deg and tilt_range_deg, too");
-  }
   pan_tilt->ptz_path = section.text("ptz_path").value_or("");
   if (!pan_tilt->ptz_path.empty() &&
       (!is_path_of_a_service(pan_tilt->ptz_path) || !is_printable(pan_tilt->ptz_path))) {
@@ -71,6 +58,23 @@ void read_onvif(YamlSection& section, PanTiltConfig* pan_tilt) {
                  "':8080/onvif/ptz_service'; the host is that of url");
   }
   pan_tilt->rate_hz = 10;  // a SOAP request costs a camera much time
+}
+
+// After finish(): a key that seems missing may be there, mistyped.
+void check_ranges(const YamlSection& section, const PanTiltConfig& pan_tilt) {
+  if (pan_tilt.pan_range_deg.has_value() != pan_tilt.tilt_range_deg.has_value()) {
+    section.fail(pan_tilt.pan_range_deg ? "tilt_range_deg" : "pan_range_deg",
+                 "is missing; give pan_range_deg and tilt_range_deg, or neither");
+  }
+  if (pan_tilt.pan_scale.has_value() != pan_tilt.tilt_scale.has_value()) {
+    section.fail(pan_tilt.pan_scale ? "tilt_scale" : "pan_scale",
+                 "is missing; give pan_scale and tilt_scale, or neither");
+  }
+  if (pan_tilt.pan_scale && !pan_tilt.pan_range_deg) {
+    section.fail("pan_scale",
+                 "is what the device tells at both ends of pan_range_deg, which is missing; give "
+                 "pan_range_deg and tilt_range_deg, too");
+  }
 }
 
 // A value of pan_tilt.type.
@@ -169,6 +173,7 @@ PanTiltConfig read_pan_tilt(YamlSection section, const std::string& path) {
   pan_tilt.max_repeat_s =
       section.number("max_repeat_s", {0, 10, "s"}).value_or(pan_tilt.max_repeat_s);
   section.finish();
+  check_ranges(section, pan_tilt);
   return pan_tilt;
 }
 

@@ -245,6 +245,10 @@ std::vector<std::string> advice_for(const VerifyInput& input, const Verification
   return out;
 }
 
+bool is_noise(const DepartureTest& test) {
+  return test.departure == Departure::kTimeJitter || test.departure == Departure::kAngleNoise;
+}
+
 // The turn of the platform that the known directions would agree with.
 std::optional<KnownResult> turn_that_agrees(const VerifyInput& input, OrientationFrom from,
                                             double log_limit) {
@@ -280,6 +284,26 @@ void judge_known(const VerifyInput& input, double log_limit, Verification* out) 
 
 }  // namespace
 
+void leave_out_covered_noise(Verification* out) {
+  if (std::none_of(out->found.begin(), out->found.end(), is_noise)) return;
+  for (const ClaimComparison& claim : out->claims) {
+    if (claim.from != OrientationFrom::kTelemetry) continue;
+    const bool covers = claim.verdict == Verdict::kNotJudged ||
+                        (claim.verdict == Verdict::kHolds && claim.result.ratio <= 1);
+    if (!covers) return;
+    if (claim.kind == ReturnKind::kAll && claim.verdict == Verdict::kNotJudged) return;
+  }
+  for (ModelComparison& comparison : out->model) {
+    const bool is_cause = test_of(out->found, comparison.test.departure) != nullptr;
+    if (is_cause && !is_noise(comparison.test)) continue;
+    if (!is_cause && comparison.verdict != Verdict::kContradicted) continue;
+    comparison.is_covered = true;
+    comparison.verdict = Verdict::kHolds;
+  }
+  out->found.erase(std::remove_if(out->found.begin(), out->found.end(), is_noise),
+                   out->found.end());
+}
+
 Verification verify(const VerifyInput& input) {
   Verification out;
   const std::vector<SeenFrame>& frames = input.frames;
@@ -305,7 +329,7 @@ Verification verify(const VerifyInput& input) {
     out.noise_ratio = model.noise_ratio;
     out.found = model.found;
     for (const DepartureTest& test : model.tests)
-      out.model.push_back({verdict_of(test, log_limit), test, ""});
+      out.model.push_back({verdict_of(test, log_limit), test, false, ""});
     const double noise_factor = std::max(1.0, model.noise_ratio * model.noise_ratio);
     for (const OrientationFrom from : {OrientationFrom::kLandmarks, OrientationFrom::kTelemetry}) {
       const std::vector<PairRows>& all =
@@ -327,6 +351,7 @@ Verification verify(const VerifyInput& input) {
       }
     }
   }
+  leave_out_covered_noise(&out);
   const bool is_enough = out.pairs >= kReturnsLeast;
   if (is_enough) out.verdict = Verdict::kHolds;
   for (ModelComparison& comparison : out.model) {

@@ -51,6 +51,8 @@ struct ClaimComparison {
 struct ModelComparison {
   Verdict verdict = Verdict::kNotJudged;
   DepartureTest test;
+  // Improbable, but it is noise of telemetry, or explained by it, that PT mode's sigmas cover.
+  bool is_covered = false;
   std::string sentence;  // the verdict in words
 };
 
@@ -116,5 +118,11 @@ inline constexpr double kLeastFreedom = 12;
 inline constexpr double kLeastShare = 0.1;
 
 [[nodiscard]] Verification verify(const VerifyInput& input);
+
+// A part of verify(), after claims, model and causes. Noise of telemetry matters by PT mode's sigmas
+// alone. If places that are seen again differ by no more than these claim, it contradicts nothing;
+// nor does what it explains: both are marked as covered, and the noise is no cause. Errors that all
+// places of a compressed picture share look like it.
+void leave_out_covered_noise(Verification* out);
 
 }  // namespace alidade

@@ -261,6 +261,8 @@ std::string sentence_of(const ModelComparison& comparison,
     case Verdict::kNotJudged:
       return fmt::format("{}: not judged; this recording does not show it", name);
     case Verdict::kHolds:
+      if (comparison.is_covered)
+        return fmt::format("{}: {}; PT mode's sigmas cover that", name, size_of(test));
       return fmt::format("{}: as calibrated; by this recording alone {}", name, size_of(test));
     case Verdict::kContradicted:
       if (const DepartureTest* beside = test_of(found, test.departure);

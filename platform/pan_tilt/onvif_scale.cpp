@@ -139,14 +139,15 @@ OnvifScale::Outcome OnvifScale::angles(const OnvifStatus& status, double* pan_ra
     return Outcome::kOk;
   }
   if (no_angles) {
-    constexpr const char* kAngles = " from its data sheet, as pan_range_deg and tilt_range_deg";
+    constexpr const char* kAngles = " as pan_range_deg and tilt_range_deg";
     const bool half = range != nullptr && is_half(*range);
     *error = any_wide || half ? "the device tells pan and tilt as " + text_of(*range) +
                                     ", by its own declaration; give the angles at these ends," +
                                     kAngles + (half ? ", and " + as_scales(*range) : "")
                               : "the device tells pan and tilt as -1..1, not in degrees; give the "
                                 "angles at -1 and 1," +
-                                    std::string(kAngles);
+                                    std::string(kAngles) +
+                                    " (often -180, 180 and -90, 90, whatever the head reaches)";
     return Outcome::kNeedsAngles;
   }
   *pan_rad = mapped(status.pan, pan_scale, *pan_.angles);

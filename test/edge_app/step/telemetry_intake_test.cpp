@@ -7,6 +7,8 @@
 
 #include <cmath>
 
+#include "core/model/angle.h"
+
 namespace alidade {
 namespace {
 
@@ -94,11 +96,11 @@ TEST(TelemetryIntake, AllowsForTheAgeOfAnglesThatADeviceRenewsByItself) {
   SlowDevice device;
   for (int i = 1; i < 250; ++i) {
     const double t = kPolls_s * i + 1e-3;
-    device.poll(t, kRate * kRenewal_s * std::floor(t / kRenewal_s));
+    device.poll(t, wrap_angle(kRate * kRenewal_s * std::floor(t / kRenewal_s)));
     const double asked_s = t - 0.13;
     if (i < 20 || !has_result(device.ask(asked_s))) continue;
     // Of the mean age, the clock offset would know.
-    const double error = device.at().angle.pan - kRate * (asked_s - 0.5 * kPolls_s);
+    const double error = wrap_angle(device.at().angle.pan - kRate * (asked_s - 0.5 * kPolls_s));
     square += error * error / device.at().covariance(0, 0);
     ++count;
   }

@@ -92,6 +92,45 @@ TEST(Verification, SaysThatDirectionsAgreeThoughACauseIsFound) {
   EXPECT_THAT(summary_of(verification), Not(HasSubstr("though")));
 }
 
+TEST(Verification, NoiseThatPtModesSigmasCoverIsNoCause) {
+  const auto improbable = [](Departure departure) {
+    ModelComparison out;
+    out.verdict = Verdict::kContradicted;
+    out.test.departure = departure;
+    out.test.size = {3e-4};
+    out.test.sigma = {2e-5};
+    return out;
+  };
+  const auto judged = [&](double ratio, Verdict verdict) {
+    Verification out;
+    ClaimComparison claim;
+    claim.from = OrientationFrom::kTelemetry;
+    claim.verdict = verdict;
+    claim.result.ratio = ratio;
+    out.claims = {claim};
+    for (const Departure departure :
+         {Departure::kAngleNoise, Departure::kPanGear, Departure::kLineDelay})
+      out.model.push_back(improbable(departure));
+    out.found = {out.model[0].test, out.model[2].test};
+    leave_out_covered_noise(&out);
+    return out;
+  };
+  const Verification covered = judged(0.6, Verdict::kHolds);
+  ASSERT_EQ(covered.found.size(), 1U);
+  EXPECT_EQ(covered.found[0].departure, Departure::kLineDelay);
+  EXPECT_EQ(covered.model[0].verdict, Verdict::kHolds);
+  EXPECT_EQ(covered.model[1].verdict, Verdict::kHolds) << "the noise explains it";
+  EXPECT_EQ(covered.model[2].verdict, Verdict::kContradicted);
+  EXPECT_THAT(sentence_of(covered.model[0], covered.found),
+              HasSubstr("RMS 0.3 +- 0.02 mrad beyond what is stated; PT mode's sigmas cover"));
+  for (const Verification& open :
+       {judged(1.05, Verdict::kHolds), judged(1.5, Verdict::kContradicted),
+        judged(0.6, Verdict::kNotJudged)}) {
+    EXPECT_EQ(open.found.size(), 2U);
+    EXPECT_EQ(open.model[0].verdict, Verdict::kContradicted);
+  }
+}
+
 TEST(Verification, HasJsonAndAPageWithEscapedNames) {
   Verification verification;
   verification.sentence = "not judged: <nothing>";

@@ -533,7 +533,7 @@ TEST(OnvifScale, TakesADeclaredRangeForWhatItCanBeAlone) {
   OnvifScale half({}, {});
   half.set_ranges({{"", OnvifInterval{0, 1}, OnvifInterval{0, 1}}});
   EXPECT_THAT(scaled(half, at(0.5, 0)).error,
-              HasSubstr("give the angles at these ends, from its data sheet, as pan_range_deg and "
+              HasSubstr("give the angles at these ends, as pan_range_deg and "
                         "tilt_range_deg, and pan_scale: [0, 1] and tilt_scale: [0, 1]"));
   for (const OnvifInterval& interval :
        {OnvifInterval{0, 100}, OnvifInterval{0, 255}, OnvifInterval{0, 36000}}) {
