@@ -79,13 +79,11 @@ void judge_renewals(const std::vector<PanTiltSample>& samples, const TelemetryNe
   if (!report->change_hz || !report->interval_s || !needs.rate_hz) return;
   const double step =
       std::max({needs.resolution_rad, report->pan.resolution, report->tilt.resolution});
-  RenewalAge age(RenewalAge::least_turn(needs.angle_sigma_rad, step), needs.limits.max_repeat_s);
-  for (const PanTiltSample& sample : samples) {
-    if (sample.restarted) age.restart();
-    static_cast<void>(age.add(middle_time_s(sample), sample.pan_rad, sample.tilt_rad));
-  }
   const double polls_hz = 1 / report->interval_s->median;
-  if (!age.is_seldom() || *report->change_hz < kAboutAsOften * polls_hz) return;
+  if (!renews_seldom(samples, RenewalAge::least_turn(needs.angle_sigma_rad, step),
+                     needs.limits.max_repeat_s) ||
+      *report->change_hz < kAboutAsOften * polls_hz)
+    return;
   add_advice(
       &report->findings,
       fmt::format("pan/tilt {}: it is asked {:.0f} times a second and, while the head turns, "

@@ -202,9 +202,8 @@ void CameraSetup::try_links() {
   PanTiltSample sample;
   if (!first_sample(config.pan_tilt, &sample, &error)) {
     const char* angles =
-        error.find("pan_range_deg") == std::string::npos
-            ? ""
-            : "; give both with --set, as --set 'pan_tilt.pan_range_deg=[-180,180]'";
+        wants_ranges(error) ? "; give both with --set, as --set 'pan_tilt.pan_range_deg=[-180,180]'"
+                            : "";
     throw CommandError(kExitFailed, "the telemetry does not come: " + error + angles +
                                         "; nothing was written (--untried writes all the same)");
   }

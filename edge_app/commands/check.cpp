@@ -60,9 +60,8 @@ std::string scale_advice(const PanTiltConfig& pan_tilt) {
   switch (pan_tilt.type) {
     case PanTiltConfig::Type::kOnvif:
       return "correct pan_tilt.pan_range_deg and tilt_range_deg: the angles at the ends of what "
-             "the "
-             "device can say, -1 and 1; often they are -180, 180 and -90, 90, whatever the head "
-             "reaches";
+             "the device can say, -1 and 1; often they are -180, 180 and -90, 90, whatever the "
+             "head reaches";
     case PanTiltConfig::Type::kRecording:
       return "correct pan_rad and tilt_rad in telemetry.csv";
     default:

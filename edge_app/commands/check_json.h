@@ -1,6 +1,7 @@
 #pragma once
 // The report of `alidade check` as one line of JSON: its numbers and all findings. The unit is part
-// of each name; an unknown value is null. The keys: docs/manual/reference/json-of-commands.md. Pure; allocates.
+// of each name; an unknown value is null. The keys: docs/manual/reference/json-of-commands.md.
+// Pure; allocates.
 
 #include <optional>
 #include <string>

@@ -15,8 +15,9 @@ namespace fs = std::filesystem;
 PublishedCalibration find_calibration(const std::string& recording,
                                       const std::string& calibration) {
   if (!calibration.empty()) {
-    const std::vector<std::string> zooms = calibrations_of_zooms(calibration);
-    if (!fs::exists(calibration) && !zooms.empty()) {
+    std::error_code ignored;
+    if (fs::exists(calibration, ignored)) return require_calibration_file(calibration);
+    if (const std::vector<std::string> zooms = calibrations_of_zooms(calibration); !zooms.empty()) {
       const std::size_t shown = std::min<std::size_t>(zooms.size(), 4);
       throw CommandError(
           kExitUsage,

@@ -160,15 +160,13 @@ VerifiedReplay replay_both_modes(const Recorded& recorded, const std::vector<Kno
 }
 
 bool is_seldom_new(const std::vector<PanTiltSample>& samples, const OrientationStepOptions& of) {
+  const bool has_clock = std::any_of(
+      samples.begin(), samples.end(),
+      [](const PanTiltSample& sample) { return sample.device_time_s || sample.sequence; });
   const TelemetryNoise& noise = of.telemetry_noise;
-  RenewalAge age(RenewalAge::least_turn(noise.pan_tilt_sigma, noise.resolution),
-                 of.telemetry_limits.max_repeat_s);
-  for (const PanTiltSample& sample : samples) {
-    if (sample.restarted) age.restart();
-    if (sample.device_time_s || sample.sequence) return false;
-    static_cast<void>(age.add(middle_time_s(sample), sample.pan_rad, sample.tilt_rad));
-  }
-  return age.is_seldom();
+  return !has_clock &&
+         renews_seldom(samples, RenewalAge::least_turn(noise.pan_tilt_sigma, noise.resolution),
+                       of.telemetry_limits.max_repeat_s);
 }
 
 // Whether the calibration was made from this recording, or was in use during it.

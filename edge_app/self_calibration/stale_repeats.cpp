@@ -7,6 +7,7 @@
 #include <map>
 
 #include "core/model/angle.h"
+#include "core/realtime/telemetry/renewal_age.h"
 
 namespace alidade {
 namespace {
@@ -162,6 +163,15 @@ std::vector<bool> find_stale_repeats(const std::vector<PanTiltSample>& samples) 
               stale.begin() + static_cast<std::ptrdiff_t>(runs[i].end), is);
   }
   return stale;
+}
+
+bool renews_seldom(const std::vector<PanTiltSample>& samples, double least_rad, double longest_s) {
+  RenewalAge age(least_rad, longest_s);
+  for (const PanTiltSample& sample : samples) {
+    if (sample.restarted) age.restart();
+    static_cast<void>(age.add(middle_time_s(sample), sample.pan_rad, sample.tilt_rad));
+  }
+  return age.is_seldom();
 }
 
 }  // namespace alidade

@@ -29,6 +29,12 @@ namespace alidade {
 // reconnection repeats nothing.
 [[nodiscard]] std::vector<bool> find_stale_repeats(const std::vector<PanTiltSample>& samples);
 
+// Whether a polled device is known, at the end, to renew its angles about as often as it is asked or
+// less often (RenewalAge): it repeated some while the head turned. least_rad: RenewalAge::least_turn().
+// longest_s: TelemetryLimits::max_repeat_s.
+[[nodiscard]] bool renews_seldom(const std::vector<PanTiltSample>& samples, double least_rad,
+                                 double longest_s);
+
 // The time of a sample, s: the middle of its interval.
 [[nodiscard]] inline double middle_time_s(const PanTiltSample& sample) {
   return 0.5 * (sample.earliest_time_s + sample.latest_time_s);

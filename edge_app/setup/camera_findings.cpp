@@ -53,8 +53,8 @@ std::string telemetry_text(const FoundCamera& camera) {
   }
   if (!trial.asked) return trial.type + ", not asked: it wants a login";
   // The configuration that is being written may have them already.
-  const bool needs_ranges = trial.error.find("pan_range_deg") != std::string::npos;
-  if (needs_ranges) return trial.type + " answers, in units of its own: " + trial.error;
+  if (wants_ranges(trial.error))
+    return trial.type + " answers, in units of its own: " + trial.error;
   if (!trial.error.empty()) return trial.type + ", no angles: " + trial.error;
   return fmt::format("{} answers: pan {:.2f} deg, tilt {:.2f} deg", trial.type, trial.pan_deg,
                      trial.tilt_deg) +

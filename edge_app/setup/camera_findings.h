@@ -24,6 +24,12 @@ struct TelemetryTrial {
   std::string error;           // one line; empty: it answered
 };
 
+// Whether an error of first_sample() says that the angles at both ends of the device's scale are
+// needed.
+[[nodiscard]] inline bool wants_ranges(const std::string& error) {
+  return error.find("pan_range_deg") != std::string::npos;
+}
+
 struct FoundCamera {
   FoundDevice device;
   DeviceReport report;

@@ -28,10 +28,15 @@ class BrowserTest(SystemTest):
         wait_until(lambda: re.search(pattern, self.text(name)), f"{pattern!r} in #{name}, where {self.text(name)!r} is")
         return self.text(name)
 
-    def fits_into(self, width):
-        """px, as of a phone (390) or a desk (1280). Leaves the browser with that width."""
+    def set_size(self, width, height=1800, factor=1):
+        """px, as of a phone (390) or a desk (1280). Until clear_size()."""
         self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {
-            "width": width, "height": 1800, "deviceScaleFactor": 1, "mobile": width < 500})
+            "width": width, "height": height, "deviceScaleFactor": factor, "mobile": width < 500})
+
+    def clear_size(self):
+        self.browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+    def fits_into_width(self):
         return not self.browser.execute_script("return document.documentElement.scrollWidth > innerWidth")
 
     def screenshot(self, name):

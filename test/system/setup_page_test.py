@@ -36,7 +36,7 @@ class SetupPage(BrowserTest):
         self.assertTrue(self.browser.find_element(By.ID, "setup").is_displayed())
         self.press("#look")
         self.wait_for_text("found", "Virtual PTZ")
-        self.assertRegex(self.text("found"), r"take: 640x480 H264.*pan and tilt: onvif, in units of its own: .*pan_range_deg")
+        self.assertRegex(self.text("found"), r"take: 160x96 H264.*pan and tilt: onvif, in units of its own: .*pan_range_deg")
         # What is missing is said, and nothing is written.
         self.press("#setup button[type=submit]")
         self.wait_for_text("said", "field of view")
@@ -45,7 +45,8 @@ class SetupPage(BrowserTest):
                            ("keys", "pan_tilt.pan_positive=left\nrealtime.priority=30\n")):
             self.write_into(name, text)
         for width, name in ((390, "setup_phone.png"), (1280, "setup.png")):
-            self.assertTrue(self.fits_into(width), width)
+            self.set_size(width)
+            self.assertTrue(self.fits_into_width(), width)
             self.screenshot(name)
         self.press("#setup button[type=submit]")
         self.wait_for_text("said", "Written: .*alidade check -c")

@@ -422,12 +422,11 @@ class StatusPage(BrowserTest):
         self.assertRegex(file.get_attribute("value"), r"(?m)^height: \{value: (9\.9|10)")
         self.screenshot("ground.png")
         for width in (390, 1280):
-            self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {
-                "width": width, "height": 1800, "deviceScaleFactor": 1, "mobile": width < 500})
-            self.assertEqual(self.browser.execute_script("return document.documentElement.scrollWidth > innerWidth"), False, width)
+            self.set_size(width)
+            self.assertTrue(self.fits_into_width(), width)
             if width == 390:
                 self.screenshot("ground_phone.png")
-        self.browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+        self.clear_size()
         self.browser.find_element(By.ID, "ground-title").click()
 
     def shows_targets(self, address):
@@ -461,8 +460,7 @@ class StatusPage(BrowserTest):
     def names_of_a_crowd_can_be_read(self):
         """No name lies on another or is cut off, no box is drawn over one, and a target at a pole stops nothing."""
         for width in (1280, 390):
-            self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {
-                "width": width, "height": 1800, "deviceScaleFactor": 1, "mobile": width < 500})
+            self.set_size(width)
             plan, picture, over, caption = self.browser.execute_script(NAMES_OF_A_CROWD)
             self.assertRegex(caption, "^31 targets .*the first 20 are listed$")
             self.assertEqual(over, 0)
@@ -479,7 +477,7 @@ class StatusPage(BrowserTest):
             if width == 1280:  # a phone has room for numbers alone
                 self.assertTrue(any("of class" in name["text"] for name in plan), plan)
             self.screenshot(f"crowd_{width}.png")
-        self.browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+        self.clear_size()
 
     def test_shows_how_far_a_calibration_is_and_what_motion_is_missing(self):
         # Over 7 % of the picture in pan, and 2.3 % in tilt, where 3 % are the least.
@@ -559,14 +557,13 @@ class StatusPage(BrowserTest):
         for (width, *_), expected in zip(bars, (25, 58.06, 0, 100)):
             self.assertAlmostEqual(width, expected, places=1)
         for width in (1280, 375):
-            self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {
-                "width": width, "height": 1400, "deviceScaleFactor": 1, "mobile": width < 500})
+            self.set_size(width, 1400)
             self.browser.execute_script("showProgress({needs: 'let landmarks cross the whole image', progress: arguments[0]})", TOO_UNCERTAIN)
             self.screenshot(f"progress_{width}.png")
-            self.assertEqual(self.browser.execute_script("return document.documentElement.scrollWidth > innerWidth"), False, width)
+            self.assertTrue(self.fits_into_width(), width)
             self.assertEqual(self.browser.execute_script("""
                 return [...document.querySelectorAll('#progress *')].filter((one) => one.getBoundingClientRect().right > innerWidth).length"""), 0, width)
-        self.browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+        self.clear_size()
         self.assertTrue(self.browser.execute_script(
             "showProgress({needs: null, progress: null}); return document.getElementById('progress').hidden"))
 
@@ -607,9 +604,8 @@ class StatusPage(BrowserTest):
         self.wait_for_text("why", r"There is no connection to the video: rtsp://127\.0\.0\.1:\d+/.*refused")
         self.wait_for_text("health", r"Pan/tilt linkhttp://127\.0\.0\.1:\d+/.*; newest \d+ s old")
         for width in (1280, 390):
-            self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {
-                "width": width, "height": 844, "deviceScaleFactor": 1, "mobile": width < 500})
-            self.assertEqual(self.browser.execute_script("return document.documentElement.scrollWidth > innerWidth"), False, width)
+            self.set_size(width, 844)
+            self.assertTrue(self.fits_into_width(), width)
         self.camera(settings=SETTINGS, seed=2, **ports)
         self.wait_for_text("link", "^live$")
         self.wait_for_text("health", r"Video link[\d.]+ a second; newest now; back again 1 times")
@@ -660,8 +656,7 @@ class StatusPage(BrowserTest):
         self.assert_no_errors_but(f"{LATE}|{AWAY}")
 
     def test_fits_a_phone_and_says_why_there_is_no_picture(self):
-        self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {
-            "width": 390, "height": 844, "deviceScaleFactor": 3, "mobile": True})
+        self.set_size(390, 844, factor=3)
         self.browser.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": TELL_CLIPPED_TEXT})
         _, address = self.start(self.config(self.camera(settings=SETTINGS), mode="PT"))
         self.browser.get(address)

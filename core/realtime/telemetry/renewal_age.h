@@ -21,8 +21,8 @@ class RenewalAge {
     return kTimes * std::fmax(noise, step);
   }
 
-  // least_rad: > 0, least_turn(). longest_s: an angle that stands for
-  // longer is that of a head at rest. 0: each angle is known to be new.
+  // least_rad: > 0, least_turn(). longest_s: an angle that stands for longer is that of a head at
+  // rest. 0: each angle is known to be new.
   RenewalAge(double least_rad, double longest_s)
       : least_rad_(least_rad),
         longest_s_(longest_s),
@@ -34,14 +34,14 @@ class RenewalAge {
     const PanTilt<double> moved{begun_ ? wrap_angle(pan - angle_.pan) : 0,
                                 begun_ ? wrap_angle(tilt - angle_.tilt) : 0};
     if (begun_ && moved.pan == 0 && moved.tilt == 0) {
-      ++repeats_;
+      repeated_ = true;
       if (state_ == State::kUnknown) new_in_a_row_ = 0;
       if (time_s - new_since_s_ > longest_s_ * kAlmost) moved_ = {};
       return false;
     }
     const bool turns_on = goes_on(moved_.pan, moved.pan) || goes_on(moved_.tilt, moved.tilt);
     const State before = state_;
-    if (turns_on && repeats_ > 0 && longest_s_ > 0) {
+    if (turns_on && repeated_) {
       state_ = State::kSeldom;
       new_in_a_row_ = 0;
     } else if (begun_ && ++new_in_a_row_ >= (state_ == State::kSeldom ? kMany : kEnough)) {
@@ -51,7 +51,7 @@ class RenewalAge {
     angle_ = {pan, tilt};
     moved_ = moved;
     new_since_s_ = time_s;
-    repeats_ = 0;
+    repeated_ = false;
     return state_ != before;
   }
 
@@ -59,7 +59,8 @@ class RenewalAge {
   void restart() {
     begun_ = false;
     moved_ = {};
-    repeats_ = new_in_a_row_ = 0;
+    repeated_ = false;
+    new_in_a_row_ = 0;
   }
 
   // Whether the device is known to renew its angles as seldom as it is asked, or less often.
@@ -87,8 +88,8 @@ class RenewalAge {
   PanTilt<double> angle_{0, 0};
   PanTilt<double> moved_{0, 0};  // to angle_; 0: the head rests
   double new_since_s_ = 0;
-  int repeats_ = 0;       // of angle_
-  int new_in_a_row_ = 0;  // new angles, since the last repeat that counts
+  bool repeated_ = false;  // angle_ has come again
+  int new_in_a_row_ = 0;   // new angles, since the last repeat that counts
 };
 
 }  // namespace alidade
